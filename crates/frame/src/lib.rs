@@ -1,0 +1,25 @@
+//! The typed resources that passes exchange, named for what they mean.
+//!
+//! Each type states space and unit, says which parts it has for which shape, and has one WGSL accessor module in `shaders/` that is the only place where
+//! its texels are decoded:
+//!
+//! | resource | accessor module |
+//! | --- | --- |
+//! | [`GBuffer`] | `lobelia::surface`, `lobelia::scene` |
+//! | [`ReflectiveShadowMap`] | `lobelia::reflective_shadow_map`, `lobelia::surface` |
+//! | [`VirtualLights`] | `lobelia::virtual_lights` |
+//! | [`LightVisibility`] | `lobelia::light_visibility` |
+//!
+//! *Scene space* is world space minus the scene's whole-metre origin, in metres, so that 32-bit floats keep their precision far from the world's origin.
+
+mod gbuffer;
+mod light;
+mod radiance;
+mod reflective_shadow_map;
+mod world;
+
+pub use gbuffer::{GBuffer, GBufferShape, SurfaceFlags, SurfaceFormats};
+pub use light::{LightVisibility, LightVisibilityShape, VirtualLight, VirtualLights, VirtualLightsShape};
+pub use radiance::{DisplayImage, ImageShape, Radiance};
+pub use reflective_shadow_map::{ReflectiveShadowMap, ReflectiveShadowMapShape, RsmFace};
+pub use world::SceneWorld;

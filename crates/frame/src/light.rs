@@ -1,0 +1,160 @@
+use encase::ShaderType;
+use glam::{UVec2, Vec3};
+use lobelia_graph::{BufferPart, Part, PartSet, Resource, Values};
+use wgpu::BufferUsages;
+
+/// Shape of [`VirtualLights`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct VirtualLightsShape {
+    /// Number of records; some may be dark (flux 0).
+    pub count: u32,
+    /// Whether records carry a specular lobe.
+    pub specular: bool,
+}
+
+/// One virtual light, as WGSL sees it (`lobelia::virtual_lights::VirtualLight`): 64 bytes.
+///
+/// It reflects `flux` arriving from `direction_to_source` by the packed material at `position`; the radiant intensity towards a unit direction w is
+/// `flux * brdf(direction_to_source, w) * max(normal . w, 0)`, W/sr.
+#[derive(Clone, Copy, Debug, ShaderType)]
+pub struct VirtualLight {
+    /// Scene space, metres.
+    pub position: Vec3,
+    /// Radius in metres of the disk that the light stands for; 0 for a point.
+    pub radius: f32,
+    /// Flux falling on the patch that this light stands for, W per channel, divided by the sampling density.
+    pub flux: Vec3,
+    /// Geometric normal, octahedral 2 x 16 bit, turned to the source.
+    pub geometric_normal: u32,
+    /// Unit direction from the light's position back to the source that lights it.
+    pub direction_to_source: Vec3,
+    /// Roughness, metallic, specular scale (`lobelia::surface` packing).
+    pub specular: u32,
+    /// Shading normal and base colour (`lobelia::surface` packing).
+    pub core: UVec2,
+    /// Index of the source light in the scene.
+    pub source: u32,
+}
+
+/// Virtual lights: patches of the scene that reflect light from the sources, so that gathering them gives one bounce of indirect light.
+#[derive(Clone, Debug)]
+pub struct VirtualLights {
+    /// Storage array of [`VirtualLight`].
+    pub lights: BufferPart,
+    /// Count and options.
+    pub shape: VirtualLightsShape,
+}
+
+impl Resource for VirtualLights {
+    const NAME: &'static str = "VirtualLights";
+    const DOC: &'static str = "Patches of the scene that reflect light: position, normals, material, incident flux (W) and its direction.";
+    type Shape = VirtualLightsShape;
+
+    fn parts(shape: &VirtualLightsShape) -> Vec<Part> {
+        let bytes = VirtualLight::min_size().get() * u64::from(shape.count.max(1));
+        // Words: position 0-2, radius 3, flux 4-6, packed 7, direction 8-10, packed 11, core 12-13, source 14, padding 15.
+        vec![Part::buffer("lights", bytes, BufferUsages::STORAGE).values(Values::Records {
+            stride: 16,
+            mask: 0b0000_0111_0111_1111,
+            non_negative: 0b0000_0000_0111_1000,
+        })]
+    }
+
+    fn assemble(shape: &VirtualLightsShape, parts: &PartSet) -> Self {
+        Self { lights: parts.buffer("lights"), shape: *shape }
+    }
+}
+
+/// Shape of a [`LightVisibility`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LightVisibilityShape {
+    /// Width and height in pixels.
+    pub extent: [u32; 2],
+    /// Number of virtual lights.
+    pub lights: u32,
+    /// Pixels are grouped in k x k blocks, in which pixel (x, y) knows only the lights i with `i mod k^2 = (x mod k) + k (y mod k)`; 1: every pixel knows every light.
+    pub interleave: u32,
+}
+
+impl LightVisibilityShape {
+    /// Most bytes that one buffer may have at the WebGPU baseline (storage binding size).
+    pub const CHUNK_BYTES: u64 = 128 << 20;
+
+    /// Most lights that one pixel knows.
+    pub fn lights_per_pixel(&self) -> u32 {
+        self.lights.div_ceil(self.interleave * self.interleave)
+    }
+
+    /// 32-bit words per pixel.
+    pub fn words_per_pixel(&self) -> u32 {
+        self.lights_per_pixel().div_ceil(32).max(1)
+    }
+
+    fn pixels(&self) -> u64 {
+        u64::from(self.extent[0]) * u64::from(self.extent[1])
+    }
+
+    /// Words per pixel in each chunk but the last.
+    pub fn words_per_chunk(&self) -> u32 {
+        let most = Self::CHUNK_BYTES / 4 / self.pixels().max(1);
+        u32::try_from(most).unwrap_or(u32::MAX).clamp(1, self.words_per_pixel())
+    }
+
+    /// Number of chunks.
+    pub fn chunks(&self) -> u32 {
+        self.words_per_pixel().div_ceil(self.words_per_chunk())
+    }
+
+    /// Words per pixel in chunk `index`.
+    pub fn words_in_chunk(&self, index: u32) -> u32 {
+        (self.words_per_pixel() - index * self.words_per_chunk()).min(self.words_per_chunk())
+    }
+}
+
+const CHUNK_NAMES: [&str; 64] = [
+    "chunk_0", "chunk_1", "chunk_2", "chunk_3", "chunk_4", "chunk_5", "chunk_6", "chunk_7", "chunk_8", "chunk_9", "chunk_10", "chunk_11", "chunk_12",
+    "chunk_13", "chunk_14", "chunk_15", "chunk_16", "chunk_17", "chunk_18", "chunk_19", "chunk_20", "chunk_21", "chunk_22", "chunk_23", "chunk_24",
+    "chunk_25", "chunk_26", "chunk_27", "chunk_28", "chunk_29", "chunk_30", "chunk_31", "chunk_32", "chunk_33", "chunk_34", "chunk_35", "chunk_36",
+    "chunk_37", "chunk_38", "chunk_39", "chunk_40", "chunk_41", "chunk_42", "chunk_43", "chunk_44", "chunk_45", "chunk_46", "chunk_47", "chunk_48",
+    "chunk_49", "chunk_50", "chunk_51", "chunk_52", "chunk_53", "chunk_54", "chunk_55", "chunk_56", "chunk_57", "chunk_58", "chunk_59", "chunk_60",
+    "chunk_61", "chunk_62", "chunk_63",
+];
+
+/// Which virtual lights each pixel's surface sees: one bit per pixel and light, 1 = visible.
+///
+/// Bits are packed 32 to a word, light-major: word `w` of pixel `p` stands at `w * pixels + p` of its chunk, so neighbouring invocations read neighbouring
+/// words. A chunk holds whole words of all pixels and fits a baseline storage binding; `lobelia::light_visibility` gives the addresses.
+#[derive(Clone, Debug)]
+pub struct LightVisibility {
+    /// Storage arrays of `u32`.
+    pub chunks: Vec<BufferPart>,
+    /// Size.
+    pub shape: LightVisibilityShape,
+}
+
+impl LightVisibility {
+    /// Largest number of chunks: 8 GiB.
+    pub const MAX_CHUNKS: u32 = CHUNK_NAMES.len() as u32;
+}
+
+impl Resource for LightVisibility {
+    const NAME: &'static str = "LightVisibility";
+    const DOC: &'static str = "One bit per pixel and virtual light: 1 where nothing stands between them.";
+    type Shape = LightVisibilityShape;
+
+    fn parts(shape: &LightVisibilityShape) -> Vec<Part> {
+        CHUNK_NAMES
+            .iter()
+            .zip(0..shape.chunks())
+            .map(|(name, index)| {
+                let bytes = 4 * shape.pixels() * u64::from(shape.words_in_chunk(index));
+                Part::buffer(name, bytes, BufferUsages::STORAGE)
+            })
+            .collect()
+    }
+
+    fn assemble(shape: &LightVisibilityShape, parts: &PartSet) -> Self {
+        let chunks = CHUNK_NAMES.iter().map_while(|name| parts.find_buffer(name)).collect();
+        Self { chunks, shape: *shape }
+    }
+}

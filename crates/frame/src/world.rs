@@ -1,0 +1,14 @@
+use lobelia_graph::World;
+use lobelia_scene::{SceneTraits, device::GpuScene};
+
+/// The world that the built-in passes run on: a scene of `lobelia-scene`.
+pub struct SceneWorld;
+
+impl World for SceneWorld {
+    type Traits = SceneTraits;
+    type Device = GpuScene;
+
+    fn unspecialised(traits: &SceneTraits) -> SceneTraits {
+        traits.unspecialised()
+    }
+}

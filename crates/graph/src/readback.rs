@@ -1,0 +1,111 @@
+//! Bringing textures and buffers back.
+
+use crate::{error::GpuError, gpu::Gpu};
+use half::f16;
+
+/// One image of a texture, rows tightly packed, row 0 first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TextureData {
+    /// Width and height in texels.
+    pub extent: [u32; 2],
+    /// Texel format.
+    pub format: wgpu::TextureFormat,
+    /// Raw texels.
+    pub bytes: Vec<u8>,
+}
+
+impl TextureData {
+    /// Texels as 32-bit floats, missing channels 0 and missing alpha 1. Integer formats give their numbers; sRGB formats are not linearised.
+    pub fn to_f32_rgba(&self) -> Vec<[f32; 4]> {
+        let texel = self.format.block_copy_size(Some(wgpu::TextureAspect::All)).or(self.format.block_copy_size(None)).unwrap_or(4) as usize;
+        let channels = usize::from(self.format.components()).max(1);
+        let width = texel / channels;
+        let unorm = matches!(self.format.sample_type(None, None), Some(wgpu::TextureSampleType::Float { .. })) && width == 1;
+        let uint = self.format.sample_type(None, None) == Some(wgpu::TextureSampleType::Uint);
+        let value = |bytes: &[u8]| match bytes {
+            [byte] if unorm => f32::from(*byte) / 255.0,
+            [byte] => f32::from(*byte),
+            [a, b] if uint => f32::from(u16::from_le_bytes([*a, *b])),
+            [a, b] => f16::from_le_bytes([*a, *b]).to_f32(),
+            [a, b, c, d] if uint => u32::from_le_bytes([*a, *b, *c, *d]) as f32,
+            [a, b, c, d] => f32::from_le_bytes([*a, *b, *c, *d]),
+            _ => 0.0,
+        };
+        let texels = self.bytes.chunks_exact(texel).map(|bytes| {
+            let mut rgba = [0.0, 0.0, 0.0, 1.0];
+            for (channel, bytes) in bytes.chunks_exact(width).take(4).enumerate() {
+                rgba[channel] = value(bytes);
+            }
+            rgba
+        });
+        texels.collect()
+    }
+
+    /// The raw 32-bit words.
+    pub fn to_u32(&self) -> Vec<u32> {
+        self.bytes.chunks_exact(4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]])).collect()
+    }
+}
+
+impl Gpu {
+    /// Reads a whole buffer that has `COPY_SRC`.
+    pub fn read_buffer(&self, buffer: &wgpu::Buffer) -> Result<Vec<u8>, GpuError> {
+        let mut encoder = self.device().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("read back") });
+        let staging = self.staging(buffer.size());
+        encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
+        self.queue().submit([encoder.finish()]);
+        self.map(&staging)
+    }
+
+    /// Reads one mip of one layer of a texture that has `COPY_SRC`.
+    pub fn read_texture(&self, texture: &wgpu::Texture, mip: u32, layer: u32) -> Result<TextureData, GpuError> {
+        let format = texture.format();
+        let aspect = if format.is_depth_stencil_format() { wgpu::TextureAspect::DepthOnly } else { wgpu::TextureAspect::All };
+        let texel = format.block_copy_size(Some(aspect)).ok_or_else(|| GpuError::ReadBack(format!("{format:?} cannot be copied")))?;
+        let [width, height] = [(texture.width() >> mip).max(1), (texture.height() >> mip).max(1)];
+        let row = width * texel;
+        let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let staging = self.staging(u64::from(padded) * u64::from(height));
+        let mut encoder = self.device().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("read back") });
+        encoder.copy_texture_to_buffer(
+            wgpu::TexelCopyTextureInfo { texture, mip_level: mip, origin: wgpu::Origin3d { x: 0, y: 0, z: layer }, aspect },
+            wgpu::TexelCopyBufferInfo {
+                buffer: &staging,
+                layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(padded), rows_per_image: Some(height) },
+            },
+            wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        );
+        self.queue().submit([encoder.finish()]);
+        let padded_bytes = self.map(&staging)?;
+        let bytes = padded_bytes.chunks_exact(padded as usize).flat_map(|line| &line[..row as usize]).copied().collect();
+        Ok(TextureData { extent: [width, height], format, bytes })
+    }
+
+    fn staging(&self, size: u64) -> wgpu::Buffer {
+        self.device().create_buffer(&wgpu::BufferDescriptor {
+            label: Some("read back"),
+            size,
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        })
+    }
+
+    pub(crate) fn map(&self, staging: &wgpu::Buffer) -> Result<Vec<u8>, GpuError> {
+        let (sender, receiver) = std::sync::mpsc::channel();
+        staging.slice(..).map_async(wgpu::MapMode::Read, move |mapped| {
+            // The receiver is gone only if the wait below failed.
+            let _ = sender.send(mapped);
+        });
+        self.wait()?;
+        match receiver.try_recv() {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => return Err(GpuError::ReadBack(error.to_string())),
+            Err(_) => return Err(GpuError::ReadBack("the device did not answer".into())),
+        }
+        let view = staging.slice(..).get_mapped_range().map_err(|error| GpuError::ReadBack(error.to_string()))?;
+        let bytes = view.to_vec();
+        drop(view);
+        staging.unmap();
+        Ok(bytes)
+    }
+}

@@ -1,0 +1,328 @@
+use super::{GraphArguments, SceneArguments, parse_save, parse_size};
+use crate::{
+    failure::Failure,
+    files::{self, Kind},
+};
+use comfy_table::{CellAlignment, Table, presets};
+use indicatif::{ProgressBar, ProgressStyle};
+use lobelia::{
+    Rendering, Session, Shot, Step,
+    explain::mebibytes,
+    frame::{DisplayImage, Radiance, SceneWorld},
+    graph::{FrameReport, Plan, Resource, RunOptions, Timing},
+};
+use std::{
+    io::Write,
+    path::{Path, PathBuf},
+};
+
+/// Render a scene through a graph.
+#[derive(clap::Args, Clone, Debug)]
+#[command(after_help = "\
+Examples:
+  lobelia render graphs/indirect.ron --scene builtin:cornell-glossy -o out.png
+  lobelia render graphs/indirect.ron --scene room.glb --camera sofa --size 1280x720 --samples 16 -o out.exr
+  lobelia render graphs/indirect.ron --variant no-visibility --set lights.count=4096 --save indirect.radiance=indirect.exr -o out.png
+  lobelia render graphs/direct.ron --scene box.glb --frames 50 --profile trace.json -o out.png")]
+pub struct Arguments {
+    #[command(flatten)]
+    graph: GraphArguments,
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// Picture to write: .png (the graph's output as it is displayed) or .exr (linear RGB before tone mapping).
+    #[arg(short, long, value_name = "FILE", required_unless_present = "saves")]
+    output: Option<PathBuf>,
+    /// Size of the picture in pixels.
+    #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "960x540")]
+    size: [u32; 2],
+    /// Camera of the scene; its first if none is named.
+    #[arg(long, value_name = "NAME")]
+    camera: Option<String>,
+    /// Average this many sub-pixel-jittered frames in linear radiance.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    samples: u32,
+    /// Run this many frames and write the last; animated scenes move on by 1/24 s each.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    frames: u32,
+    /// Seed of everything random; equal seeds give equal pictures.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u32,
+    /// Write any resource of the graph: .exr (radiance), .png (display image or radiance), .npz (anything).
+    #[arg(long = "save", value_name = "PASS.PORT=FILE", value_parser = parse_save)]
+    saves: Vec<(String, PathBuf)>,
+    /// Write a trace of CPU and device work that Perfetto and chrome://tracing open.
+    #[arg(long, value_name = "FILE")]
+    profile: Option<PathBuf>,
+    /// Use the device whose name contains this.
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// Use only what every WebGPU device has: no optional features, default limits.
+    #[arg(long)]
+    baseline: bool,
+    /// Do not specialise shaders and resources to the scene: the yardstick for what specialising saves.
+    #[arg(long)]
+    no_specialise: bool,
+    /// Poison resources and count non-finite and negative values after every pass; the first offender is named. Slow.
+    #[arg(long)]
+    check: bool,
+    /// Print nothing but errors.
+    #[arg(short, long)]
+    quiet: bool,
+    /// Print what was done as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let wired = arguments.graph.wire()?;
+    check_goals(arguments)?;
+    let scene = Session::load(&arguments.scene.scene, &arguments.scene.options())?;
+    if !arguments.quiet {
+        for warning in &scene.warnings {
+            eprintln!("warning: {warning}");
+        }
+    }
+    let mut shot = Shot {
+        extent: arguments.size,
+        camera: arguments.camera.clone(),
+        samples: arguments.samples,
+        frames: arguments.frames,
+        seed: arguments.seed,
+        keep: arguments.saves.iter().map(|(port, _)| port.clone()).collect(),
+        specialise: !arguments.no_specialise,
+        ..Shot::default()
+    };
+    // Everything that can be wrong with the input is found before the device is started.
+    scene.camera(shot.camera.as_deref()).map_err(lobelia::SessionError::from)?;
+    let plan = wired.plan(&scene.traits(), &shot.plan_options())?;
+    check_kinds(arguments, &plan)?;
+    warn_unlit(arguments, &scene.traits());
+    drop(plan);
+
+    let gpu = lobelia::graph::Gpu::new(&lobelia::graph::GpuOptions { adapter: arguments.adapter.clone(), baseline: arguments.baseline })?;
+    let timing = match (arguments.quiet && !arguments.json && arguments.profile.is_none(), gpu.has_timestamps()) {
+        (true, _) => Timing::Off,
+        (false, true) => Timing::Timestamps,
+        (false, false) => Timing::Isolated,
+    };
+    shot.run = RunOptions { check: arguments.check, timing };
+    let mut session = Session::with(gpu, scene, arguments.scene.time)?;
+    let mut rendering = session.start(&wired, &shot)?;
+    let bar = progress_bar(arguments, &shot);
+    let picture = rendering.run(&mut |step| show_step(&bar, &shot, step))?;
+    bar.finish_and_clear();
+
+    if let Some(path) = &arguments.output {
+        match (files::kind_of(path, &[Kind::Png, Kind::Exr])?, &picture.display) {
+            (Kind::Exr, _) => files::write_exr(path, &picture.image())?,
+            (_, Some(rgba)) => files::write_png(path, picture.extent, rgba)?,
+            (_, None) => files::write_linear_png(path, &picture.image())?,
+        }
+    }
+    for (port, path) in &arguments.saves {
+        save(&rendering, port, path)?;
+    }
+    if let Some(path) = &arguments.profile {
+        write_profile(path, rendering.reports())?;
+    }
+    report(arguments, &rendering, timing)
+}
+
+/// Refuses what could not be written, before any work.
+fn check_goals(arguments: &Arguments) -> Result<(), Failure> {
+    if let Some(path) = &arguments.output {
+        files::kind_of(path, &[Kind::Png, Kind::Exr])?;
+    }
+    let saves = arguments.saves.iter().map(|(_, path)| path);
+    for path in arguments.output.iter().chain(saves).chain(&arguments.profile) {
+        files::check_folder(path)?;
+    }
+    Ok(())
+}
+
+fn allowed_kinds(type_name: &str) -> &'static [Kind] {
+    match type_name {
+        name if name == Radiance::NAME => &[Kind::Exr, Kind::Png, Kind::Npz],
+        name if name == DisplayImage::NAME => &[Kind::Png, Kind::Npz],
+        _ => &[Kind::Npz],
+    }
+}
+
+fn type_of<'a>(plan: &'a Plan<SceneWorld>, port: &str) -> &'a str {
+    plan.find(port).map_or("", |index| plan.resources[index].type_name)
+}
+
+fn check_kinds(arguments: &Arguments, plan: &Plan<SceneWorld>) -> Result<(), Failure> {
+    for (port, path) in &arguments.saves {
+        files::kind_of(path, allowed_kinds(type_of(plan, port)))?;
+    }
+    let output = &plan.resources[plan.output];
+    if let Some(path) = &arguments.output
+        && allowed_kinds(output.type_name) == [Kind::Npz]
+    {
+        return Err(Failure::Input(format!(
+            "{}: the graph's output `{}` is {}, not a picture; write it with --save {}=FILE.npz",
+            path.display(),
+            output.name,
+            output.type_name,
+            output.name
+        )));
+    }
+    Ok(())
+}
+
+/// Lights that no pass of the graph uses would leave a dark picture unexplained.
+fn warn_unlit(arguments: &Arguments, traits: &lobelia::scene::SceneTraits) {
+    let area = traits.quad_lights + traits.disk_lights + traits.sphere_lights;
+    if area > 0 && traits.punctual_lights() == 0 && !arguments.quiet {
+        eprintln!("warning: the scene is lit by {area} area light(s) only, and no pass of this graph casts their light; they are drawn, but light nothing");
+    } else if area == 0 && traits.punctual_lights() == 0 && !arguments.quiet {
+        eprintln!("warning: the scene has no light that a pass of this graph casts; only emission and background are seen");
+    }
+}
+
+fn progress_bar(arguments: &Arguments, shot: &Shot) -> ProgressBar {
+    if arguments.quiet || arguments.json {
+        return ProgressBar::hidden();
+    }
+    // Drawn to standard error, and only if that is a terminal.
+    let bar = ProgressBar::new(u64::from(shot.frames) * u64::from(shot.samples) * 1000);
+    let style = ProgressStyle::with_template("{bar:32} {percent:>3} %  {elapsed_precise} (left {eta})  {msg}");
+    if let Ok(style) = style {
+        bar.set_style(style);
+    }
+    bar
+}
+
+fn show_step(bar: &ProgressBar, shot: &Shot, step: &Step) -> bool {
+    let done = u64::from(step.frame) * u64::from(shot.samples) + u64::from(step.sample);
+    let within = step.pass.as_ref().map_or(0.0, |(_, done)| *done);
+    bar.set_position(done * 1000 + (within * 1000.0) as u64);
+    let pass = step.pass.as_ref().map(|(name, done)| format!(", {name} {:.0} %", done * 100.0)).unwrap_or_default();
+    bar.set_message(format!("frame {}/{}, sample {}/{}{pass}", step.frame + 1, shot.frames, step.sample + 1, shot.samples));
+    true
+}
+
+fn save(rendering: &Rendering<'_>, port: &str, path: &Path) -> Result<(), Failure> {
+    let type_name = type_of(rendering.plan(), port);
+    match files::kind_of(path, allowed_kinds(type_name))? {
+        Kind::Npz => files::write_npz(path, &rendering.runner().read(rendering.gpu(), port)?),
+        Kind::Exr => files::write_exr(path, &rendering.radiance(port)?),
+        Kind::Png if type_name == Radiance::NAME => files::write_linear_png(path, &rendering.radiance(port)?),
+        Kind::Png => {
+            let data = rendering.runner().read_image(rendering.gpu(), port)?;
+            files::write_png(path, data.extent, &data.bytes)
+        }
+    }
+}
+
+fn write_profile(path: &Path, reports: &[FrameReport]) -> Result<(), Failure> {
+    lobelia::graph::timing::write_chrome_trace(path, reports).map_err(|error| Failure::Run(format!("{}: {error}", path.display())))
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    match values.len() {
+        0 => None,
+        odd if odd % 2 == 1 => Some(values[middle]),
+        _ => Some((values[middle - 1] + values[middle]) / 2.0),
+    }
+}
+
+/// A row of the table: a pass with medians over frames.
+struct Row {
+    pass: String,
+    kind: &'static str,
+    gpu_ms: Option<f64>,
+    cpu_ms: Option<f64>,
+    bytes: u64,
+}
+
+fn rows(rendering: &Rendering<'_>) -> Vec<Row> {
+    let plan = rendering.plan();
+    // The first frame compiles and warms up; it is left out where there are others.
+    let reports = rendering.reports();
+    let reports = if reports.len() > 1 { &reports[1..] } else { reports };
+    plan.passes
+        .iter()
+        .map(|pass| {
+            let times = || reports.iter().flat_map(|report| &report.passes).filter(|time| time.pass == pass.name);
+            Row {
+                pass: pass.name.clone(),
+                kind: pass.kind_name(),
+                gpu_ms: median(times().filter_map(|time| time.gpu_ms).collect()),
+                cpu_ms: median(times().map(|time| time.cpu_ms).collect()),
+                bytes: pass.outputs.iter().map(|index| plan.resources[*index].bytes()).sum(),
+            }
+        })
+        .collect()
+}
+
+fn report(arguments: &Arguments, rendering: &Rendering<'_>, timing: Timing) -> Result<(), Failure> {
+    if arguments.quiet && !arguments.json {
+        return Ok(());
+    }
+    let rows = rows(rendering);
+    let plan = rendering.plan();
+    let adapter = rendering.gpu().info().map_or_else(String::new, |info| info.name.clone());
+    let written: Vec<String> = arguments
+        .output
+        .iter()
+        .chain(arguments.saves.iter().map(|(_, path)| path))
+        .chain(&arguments.profile)
+        .map(|path| path.display().to_string())
+        .collect();
+    let how = match timing {
+        Timing::Off => "off",
+        Timing::Timestamps => "timestamps",
+        Timing::Isolated => "wall clock, each pass alone",
+    };
+    let mut out = std::io::stdout().lock();
+    if arguments.json {
+        let passes: Vec<_> = rows
+            .iter()
+            .map(|row| {
+                serde_json::json!({
+                    "pass": row.pass, "kind": row.kind, "gpu_ms": row.gpu_ms, "cpu_ms": row.cpu_ms, "mebibytes": row.bytes as f64 / (1u64 << 20) as f64,
+                })
+            })
+            .collect();
+        let dropped: Vec<_> =
+            plan.dropped.iter().map(|dropped| serde_json::json!({"pass": dropped.pass, "kind": dropped.kind, "reason": dropped.reason})).collect();
+        let value = serde_json::json!({
+            "graph": arguments.graph.graph, "scene": arguments.scene.scene, "variants": arguments.graph.variants, "device": adapter,
+            "size": arguments.size, "samples": arguments.samples, "frames": arguments.frames, "seed": arguments.seed, "timing": how,
+            "passes": passes, "dropped": dropped, "mebibytes": plan.bytes() as f64 / (1u64 << 20) as f64, "written": written,
+        });
+        writeln!(out, "{value:#}")?;
+        return Ok(());
+    }
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING).set_header(["pass", "kind", "device ms", "CPU ms", "MiB"]);
+    for column in 2..5 {
+        if let Some(column) = table.column_mut(column) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    let milliseconds = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"));
+    for row in &rows {
+        table.add_row([row.pass.clone(), row.kind.to_owned(), milliseconds(row.gpu_ms), milliseconds(row.cpu_ms), mebibytes(row.bytes)]);
+    }
+    let sum = |values: Vec<Option<f64>>| milliseconds(values.into_iter().flatten().reduce(|left, right| left + right));
+    let total = [
+        "all".to_owned(),
+        String::new(),
+        sum(rows.iter().map(|row| row.gpu_ms).collect()),
+        sum(rows.iter().map(|row| row.cpu_ms).collect()),
+        format!("{} (shared)", mebibytes(plan.bytes())),
+    ];
+    table.add_row(total);
+    writeln!(out, "{table}")?;
+    for dropped in &plan.dropped {
+        writeln!(out, "left out: {} ({}): {}", dropped.pass, dropped.kind, dropped.reason)?;
+    }
+    writeln!(out, "device: {adapter}; times: {how}, median of {} frame(s)", rendering.reports().len())?;
+    writeln!(out, "wrote {}", written.join(", "))?;
+    Ok(())
+}

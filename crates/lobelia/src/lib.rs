@@ -1,0 +1,48 @@
+//! Lobelia's facade: every built-in pass in one registry, and the [`Session`] that loads a scene, plans a graph and renders it.
+//!
+//! ```no_run
+//! use lobelia::{Session, SessionOptions, Shot};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let graph = lobelia::graph::GraphFile::load("graphs/indirect.ron".as_ref())?;
+//! let mut session = Session::new("builtin:cornell-glossy", &SessionOptions::default())?;
+//! let wired = graph.wire(&lobelia::registry(), &["vpl".into()], &[])?;
+//! let shot = Shot { extent: [240, 240], ..Shot::default() };
+//! let mut render = session.start(&wired, &shot)?;
+//! let picture = render.run(&mut |_| true)?;
+//! println!("{:?}", picture.pixels[0]);
+//! # Ok(()) }
+//! ```
+
+pub use lobelia_compose as compose;
+pub use lobelia_direct as direct;
+pub use lobelia_frame as frame;
+pub use lobelia_gbuffer as gbuffer;
+pub use lobelia_graph as graph;
+pub use lobelia_lobes as lobes;
+pub use lobelia_measure as measure;
+pub use lobelia_rsm as rsm;
+pub use lobelia_scene as scene;
+pub use lobelia_shaders as shaders;
+pub use lobelia_visibility as visibility;
+pub use lobelia_vpl as vpl;
+
+pub mod explain;
+mod session;
+
+pub use session::{Picture, Rendering, Session, SessionError, SessionOptions, Shot, Step};
+
+use lobelia_frame::SceneWorld;
+use lobelia_graph::Registry;
+
+/// Every built-in pass, listed one crate at a time: no link-time magic. A host adds its own passes to what this returns.
+pub fn registry() -> Registry<SceneWorld> {
+    let mut registry = Registry::new();
+    lobelia_gbuffer::register(&mut registry);
+    lobelia_rsm::register(&mut registry);
+    lobelia_direct::register(&mut registry);
+    lobelia_vpl::register(&mut registry);
+    lobelia_visibility::register(&mut registry);
+    lobelia_compose::register(&mut registry);
+    registry
+}

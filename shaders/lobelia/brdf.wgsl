@@ -1,0 +1,140 @@
+// The reflectance of glTF surfaces: Lambert plus a microfacet lobe with Smith's height-correlated masking and Schlick's Fresnel term.
+//
+//   f = base (1 - metallic) / pi + D G2 F / (4 (n.l) (n.v)),   alpha = max(roughness^2, 0.001)
+//
+// Flags: SPECULAR (off: Lambert only), NDF_PHONG (off: GGX).
+#define_import_path lobelia::brdf
+
+#import lobelia::math::{INV_PI, PI, fifth_power, safe_normalize}
+#import lobelia::surface::Surface
+
+const MIN_ALPHA: f32 = 0.001;
+
+struct Brdf {
+    // Diffuse albedo over pi.
+    diffuse: vec3f,
+    // Reflectance at normal incidence, and at grazing incidence.
+    reflectance_normal: vec3f,
+    reflectance_grazing: f32,
+    alpha: f32,
+}
+
+fn brdf_from_surface(surface: Surface) -> Brdf {
+    var brdf: Brdf;
+    brdf.diffuse = surface.base_color * ((1.0 - surface.metallic) * INV_PI);
+#ifdef SPECULAR
+    brdf.reflectance_normal = surface.specular * mix(vec3f(0.04), surface.base_color, surface.metallic);
+    brdf.reflectance_grazing = surface.specular;
+    brdf.alpha = max(surface.roughness * surface.roughness, MIN_ALPHA);
+#else
+    brdf.reflectance_normal = vec3f(0.0);
+    brdf.reflectance_grazing = 0.0;
+    brdf.alpha = 1.0;
+#endif
+    return brdf;
+}
+
+// sin^2 of the angle between unit vectors without cancellation: 1 - (n.h)^2 loses every digit of a sharp lobe.
+fn sin_squared(n: vec3f, h: vec3f) -> f32 {
+    let c = cross(n, h);
+    return min(dot(c, c), 1.0);
+}
+
+// GGX (Trowbridge-Reitz): alpha^2 / (pi ((n.h)^2 (alpha^2 - 1) + 1)^2), the bracket written as cos^2 alpha^2 + sin^2.
+fn ggx_distribution(alpha: f32, n: vec3f, h: vec3f) -> f32 {
+    let s2 = sin_squared(n, h);
+    let alpha_squared = alpha * alpha;
+    let bracket = (1.0 - s2) * alpha_squared + s2;
+    let ratio = alpha / bracket;
+    return ratio * ratio * INV_PI;
+}
+
+// G2 / (4 (n.l) (n.v)) for GGX, height-correlated.
+fn ggx_visibility(alpha: f32, n_dot_l: f32, n_dot_v: f32) -> f32 {
+    let alpha_squared = alpha * alpha;
+    let lambda_v = n_dot_l * sqrt(n_dot_v * n_dot_v * (1.0 - alpha_squared) + alpha_squared);
+    let lambda_l = n_dot_v * sqrt(n_dot_l * n_dot_l * (1.0 - alpha_squared) + alpha_squared);
+    return 0.5 / max(lambda_v + lambda_l, 1e-20);
+}
+
+// Exponent of the Phong distribution that matches alpha, in [0, 2e6].
+fn phong_exponent(alpha: f32) -> f32 {
+    return max(2.0 / (alpha * alpha) - 2.0, 0.0);
+}
+
+// log(1 - x) for x in [0, 1), exact to rounding for small x too.
+fn log_one_minus(x: f32) -> f32 {
+    if x < 0.01 {
+        return -x * (1.0 + x * (0.5 + x * (0.333333333 + x * (0.25 + x * 0.2))));
+    }
+    return log(max(1.0 - x, 1e-30));
+}
+
+// (e + 2) / (2 pi) (n.h)^e. The power is exp(e/2 log(1 - sin^2)): pow would lose the lobe at large exponents.
+fn phong_distribution(alpha: f32, n: vec3f, h: vec3f) -> f32 {
+    let exponent = phong_exponent(alpha);
+    return (exponent + 2.0) * 0.5 * INV_PI * exp(0.5 * exponent * log_one_minus(sin_squared(n, h)));
+}
+
+// Smith's Lambda = 1/G1 - 1 of the Phong distribution, rational fit of Walter et al. 2007 (equation 24, with a = sqrt(e/2 + 1) / tan).
+fn phong_lambda(alpha: f32, n_dot_w: f32) -> f32 {
+    let sine = sqrt(max(1.0 - n_dot_w * n_dot_w, 1e-12));
+    let a = sqrt(0.5 * phong_exponent(alpha) + 1.0) * n_dot_w / sine;
+    if a >= 1.6 {
+        return 0.0;
+    }
+    return (1.0 + 2.276 * a + 2.577 * a * a) / max(3.535 * a + 2.181 * a * a, 1e-12) - 1.0;
+}
+
+fn phong_visibility(alpha: f32, n_dot_l: f32, n_dot_v: f32) -> f32 {
+    let masking = 1.0 + phong_lambda(alpha, n_dot_l) + phong_lambda(alpha, n_dot_v);
+    return 0.25 / max(masking * n_dot_l * n_dot_v, 1e-20);
+}
+
+// Schlick's approximation between f0 and f90.
+fn fresnel(brdf: Brdf, v_dot_h: f32) -> vec3f {
+    return brdf.reflectance_normal + (vec3f(brdf.reflectance_grazing) - brdf.reflectance_normal) * fifth_power(clamp(1.0 - v_dot_h, 0.0, 1.0));
+}
+
+// The specular part of f, 1/sr, for n.l > 0 and n.v > 0.
+fn evaluate_specular(brdf: Brdf, n: vec3f, l: vec3f, v: vec3f, n_dot_l: f32, n_dot_v: f32) -> vec3f {
+#ifdef SPECULAR
+    let h = safe_normalize(l + v, n);
+#ifdef NDF_PHONG
+    let lobe = phong_distribution(brdf.alpha, n, h) * phong_visibility(brdf.alpha, n_dot_l, n_dot_v);
+#else
+    let lobe = ggx_distribution(brdf.alpha, n, h) * ggx_visibility(brdf.alpha, n_dot_l, n_dot_v);
+#endif
+    return lobe * fresnel(brdf, clamp(dot(v, h), 0.0, 1.0));
+#else
+    return vec3f(0.0);
+#endif
+}
+
+// f(l, v), 1/sr, without the cosine; all vectors unit. 0 unless n.l > 0, n.v > 0 and l and v are on the same side of the geometric normal.
+fn evaluate_brdf(brdf: Brdf, n: vec3f, geometric_normal: vec3f, l: vec3f, v: vec3f) -> vec3f {
+    let n_dot_l = dot(n, l);
+    let n_dot_v = dot(n, v);
+    var sides = 1.0;
+#ifdef NORMAL_MAP
+    sides = dot(geometric_normal, l) * dot(geometric_normal, v);
+#endif
+    if !(n_dot_l > 0.0 && n_dot_v > 0.0 && sides > 0.0) {
+        return vec3f(0.0);
+    }
+    return brdf.diffuse + evaluate_specular(brdf, n, l, v, n_dot_l, n_dot_v);
+}
+
+// About how much light the whole surface reflects under a direction: diffuse albedo plus Karis' 2014 fit of the split-sum term.
+// Good to some per cent; it steers sampling and no picture depends on it.
+fn albedo_estimate(brdf: Brdf, n_dot_l: f32) -> vec3f {
+    var albedo = brdf.diffuse * PI;
+#ifdef SPECULAR
+    let roughness = sqrt(brdf.alpha);
+    let r = roughness * vec4f(-1.0, -0.0275, -0.572, 0.022) + vec4f(1.0, 0.0425, 1.04, -0.04);
+    let a004 = min(r.x * r.x, exp2(-9.28 * n_dot_l)) * r.x + r.y;
+    let ab = vec2f(-1.04, 1.04) * a004 + r.zw;
+    albedo += max(brdf.reflectance_normal * ab.x + vec3f(brdf.reflectance_grazing * ab.y), vec3f(0.0));
+#endif
+    return albedo;
+}

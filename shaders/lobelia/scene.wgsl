@@ -1,0 +1,79 @@
+// What the scene puts on the device: view, lights, instances, materials. Mirrors `lobelia-scene`'s `device` module.
+// Scene space is world space minus the scene's origin, metres.
+#define_import_path lobelia::scene
+
+const LIGHT_POINT: u32 = 0u;
+const LIGHT_SPOT: u32 = 1u;
+const LIGHT_DIRECTIONAL: u32 = 2u;
+
+struct View {
+    clip_from_scene: mat4x4f,
+    previous_clip_from_scene: mat4x4f,
+    // Camera, scene space.
+    position: vec3f,
+    near: f32,
+    // Unit.
+    forward: vec3f,
+    frame: u32,
+    // Times aspect * tan(yfov / 2).
+    right: vec3f,
+    seed: u32,
+    // Times tan(yfov / 2).
+    up: vec3f,
+    padding: u32,
+    // Pixels.
+    extent: vec2f,
+    // Added to the sample position, pixels, within [-0.5, 0.5].
+    jitter: vec2f,
+}
+
+struct PunctualLight {
+    // Scene space, metres.
+    position: vec3f,
+    kind: u32,
+    // Unit; where the light travels.
+    direction: vec3f,
+    cos_outer: f32,
+    // W/sr (point, spot) or W/m^2 (directional), per channel.
+    intensity: vec3f,
+    // 1 / max(0.001, cos inner - cos outer).
+    spot_scale: f32,
+}
+
+struct Instance {
+    scene_from_local: mat4x4f,
+    // Columns of the inverse transpose of its linear part; w of the first is the sign of its determinant.
+    normal_column_x: vec4f,
+    normal_column_y: vec4f,
+    normal_column_z: vec4f,
+}
+
+struct Material {
+    base_color: vec3f,
+    metallic: f32,
+    // Radiance, W/(sr m^2).
+    emissive: vec3f,
+    roughness: f32,
+    // Scale of the specular lobe; 0: diffuse only.
+    specular: f32,
+    normal_scale: f32,
+    // 0: opaque.
+    alpha_cutoff: f32,
+    flags: u32,
+}
+
+// Direction through the sample position of pixel (x, y), y down; not unit: its part along `view.forward` is 1.
+fn primary_ray(view: View, pixel: vec2f) -> vec3f {
+    let ndc = (pixel + vec2f(0.5) + view.jitter) * 2.0 / view.extent - vec2f(1.0);
+    return view.forward + ndc.x * view.right - ndc.y * view.up;
+}
+
+// Distance along `view.forward`, metres, of a reverse-Z depth > 0.
+fn view_depth(view: View, depth: f32) -> f32 {
+    return view.near / depth;
+}
+
+// Scene-space position of what pixel (x, y) sees. Its error is about 2^-23 of the distance to the camera.
+fn scene_position(view: View, pixel: vec2f, depth: f32) -> vec3f {
+    return view.position + primary_ray(view, pixel) * view_depth(view, depth);
+}
