@@ -1,0 +1,120 @@
+//! `extras.area_light` of a node, and the surface that such a light has.
+
+use crate::{AreaShape, Instance, Material, Mesh, Scene};
+use glam::{Vec2, Vec3};
+use serde::Deserialize;
+use std::{f32::consts::PI, sync::Arc};
+
+#[derive(Deserialize)]
+struct Extras {
+    area_light: Option<Written>,
+}
+
+#[derive(Deserialize)]
+struct Written {
+    shape: String,
+    width: Option<f32>,
+    height: Option<f32>,
+    radius: Option<f32>,
+    radiance: [f32; 3],
+}
+
+/// Shape and radiance, if the extras hold an area light.
+pub(crate) fn parse(json: &str) -> Result<Option<(AreaShape, Vec3)>, String> {
+    // Other programs keep other things in extras.
+    let value: serde_json::Value = serde_json::from_str(json).map_err(|error| format!("its extras are not JSON: {error}"))?;
+    if value.get("area_light").is_none() {
+        return Ok(None);
+    }
+    let extras: Extras = serde_json::from_value(value).map_err(|error| format!("extras.area_light: {error}"))?;
+    let Some(light) = extras.area_light else { return Ok(None) };
+    let length = |name: &str, value: Option<f32>| match value {
+        Some(value) if value > 0.0 && value.is_finite() => Ok(value),
+        Some(value) => Err(format!("extras.area_light: `{name}` is {value}, but must be positive and finite")),
+        None => Err(format!("extras.area_light: a {} needs `{name}`", light.shape)),
+    };
+    let shape = match light.shape.as_str() {
+        "quad" => AreaShape::Quad { width: length("width", light.width)?, height: length("height", light.height)? },
+        "disk" => AreaShape::Disk { radius: length("radius", light.radius)? },
+        "sphere" => AreaShape::Sphere { radius: length("radius", light.radius)? },
+        other => return Err(format!("extras.area_light: shape `{other}` is none of quad, disk, sphere")),
+    };
+    let radiance = Vec3::from_array(light.radiance);
+    if !radiance.is_finite() || radiance.min_element() < 0.0 {
+        return Err(format!("extras.area_light: radiance is {radiance}, but must be finite and not negative"));
+    }
+    Ok(Some((shape, radiance)))
+}
+
+/// Adds the light's own surface: black, emitting on its front, which blocks light and is seen.
+pub(crate) fn add_surface(scene: &mut Scene, index: usize) {
+    let light = scene.area_lights[index].clone();
+    let mut mesh = match light.shape {
+        AreaShape::Quad { width, height } => quad(width, height),
+        AreaShape::Disk { radius } => disk(radius),
+        AreaShape::Sphere { radius } => sphere(radius, 64, 32),
+    };
+    mesh.material = scene.materials.len();
+    mesh.fill();
+    scene.materials.push(Material {
+        name: format!("{} (light)", light.name),
+        base_color: Vec3::ZERO,
+        metallic: 0.0,
+        specular: 0.0,
+        emissive: light.radiance,
+        ..Material::default()
+    });
+    let meshes = Arc::make_mut(&mut scene.meshes);
+    meshes.push(mesh);
+    let mesh = meshes.len() - 1;
+    scene.instances.push(Instance { mesh, world_from_local: light.world_from_local, name: light.name, area_light: Some(index), node: light.node });
+}
+
+/// Front towards -Z.
+fn quad(width: f32, height: f32) -> Mesh {
+    let (x, y) = (width / 2.0, height / 2.0);
+    Mesh {
+        positions: vec![Vec3::new(-x, -y, 0.0), Vec3::new(-x, y, 0.0), Vec3::new(x, y, 0.0), Vec3::new(x, -y, 0.0)],
+        normals: vec![Vec3::NEG_Z; 4],
+        indices: vec![0, 1, 2, 0, 2, 3],
+        ..Mesh::default()
+    }
+}
+
+/// Front towards -Z.
+fn disk(radius: f32) -> Mesh {
+    const SEGMENTS: u32 = 128;
+    // The polygon has the disk's area, not its circumscribed circle.
+    let step = 2.0 * PI / SEGMENTS as f32;
+    let rim = radius * (step / step.sin()).sqrt();
+    let at = |segment: u32| Vec2::from_angle(step * segment as f32) * rim;
+    let mut mesh = Mesh { positions: vec![Vec3::ZERO], ..Mesh::default() };
+    mesh.positions.extend((0..SEGMENTS).map(|segment| at(segment).extend(0.0)));
+    mesh.normals = vec![Vec3::NEG_Z; mesh.positions.len()];
+    mesh.indices = (0..SEGMENTS).flat_map(|segment| [0, 1 + (segment + 1) % SEGMENTS, 1 + segment]).collect();
+    mesh
+}
+
+/// A sphere with its front outwards.
+pub(crate) fn sphere(radius: f32, segments: u32, rings: u32) -> Mesh {
+    let mut mesh = Mesh::default();
+    for ring in 0..=rings {
+        let (sine, cosine) = (PI * ring as f32 / rings as f32).sin_cos();
+        for segment in 0..=segments {
+            let around = Vec2::from_angle(2.0 * PI * segment as f32 / segments as f32);
+            let normal = Vec3::new(sine * around.x, cosine, -sine * around.y);
+            mesh.positions.push(normal * radius);
+            mesh.normals.push(normal);
+            mesh.uvs.push(Vec2::new(segment as f32 / segments as f32, ring as f32 / rings as f32));
+        }
+    }
+    for ring in 0..rings {
+        for segment in 0..segments {
+            let a = ring * (segments + 1) + segment;
+            let b = a + segments + 1;
+            mesh.indices.extend([a, b, b + 1, a, b + 1, a + 1]);
+        }
+    }
+    mesh.drop_degenerate();
+    mesh
+}

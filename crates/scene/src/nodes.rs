@@ -1,0 +1,79 @@
+//! The node tree: who hangs below whom, and where that puts them.
+
+use crate::animation::Channel;
+use glam::{DMat4, DQuat, DVec3};
+
+/// Translation, rotation and scale, or a matrix that no animation touches.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Transform {
+    Matrix(DMat4),
+    Parts { translation: DVec3, rotation: DQuat, scale: DVec3 },
+}
+
+impl Transform {
+    pub fn matrix(&self) -> DMat4 {
+        match self {
+            Transform::Matrix(matrix) => *matrix,
+            Transform::Parts { translation, rotation, scale } => DMat4::from_scale_rotation_translation(*scale, *rotation, *translation),
+        }
+    }
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Node {
+    /// Comes before this node in the list.
+    pub parent: Option<usize>,
+    pub rest: Transform,
+    pub now: Transform,
+}
+
+/// Nodes, parents first.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct NodeTree {
+    pub nodes: Vec<Node>,
+    pub channels: Vec<Channel>,
+    pub origin: Option<DVec3>,
+}
+
+impl NodeTree {
+    pub fn is_animated(&self) -> bool {
+        !self.channels.is_empty()
+    }
+
+    pub fn animation_seconds(&self) -> f32 {
+        self.channels.iter().map(Channel::end).fold(0.0, f32::max)
+    }
+
+    pub fn animate(&mut self, seconds: f32) {
+        for node in &mut self.nodes {
+            node.now = node.rest;
+        }
+        for channel in &self.channels {
+            channel.apply(seconds, &mut self.nodes[channel.node].now);
+        }
+    }
+
+    pub fn world_matrices(&self) -> Vec<DMat4> {
+        let mut world: Vec<DMat4> = Vec::with_capacity(self.nodes.len());
+        for node in &self.nodes {
+            let local = node.now.matrix();
+            world.push(match node.parent {
+                Some(parent) => world[parent] * local,
+                None => local,
+            });
+        }
+        world
+    }
+
+    /// Whether an animation moves a node, itself or through what it hangs below.
+    pub fn moves(&self, node: usize) -> bool {
+        let mut current = Some(node);
+        while let Some(index) = current {
+            if self.channels.iter().any(|channel| channel.node == index) {
+                return true;
+            }
+            current = self.nodes[index].parent;
+        }
+        false
+    }
+}

@@ -1,0 +1,211 @@
+//! Facts of a scene that passes ask.
+
+use crate::{AlphaMode, AreaShape, LightKind, MIN_ALPHA, Material, Ndf, Scene};
+use glam::DVec3;
+use serde::Serialize;
+
+/// Half angle in radians up to which a spot light is seen by one square face; wider ones take six, like points.
+pub const CUBE_FACE_OUTER: f32 = 65.0 * std::f32::consts::PI / 180.0;
+
+/// An axis-aligned box in world space, metres.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Bounds {
+    /// Least corner.
+    pub min: DVec3,
+    /// Greatest corner.
+    pub max: DVec3,
+}
+
+impl Bounds {
+    /// Holds nothing.
+    pub const EMPTY: Bounds = Bounds { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
+
+    /// Grows to hold a point.
+    pub fn include(&mut self, point: DVec3) {
+        // `min` of glam drops NaN; a NaN must stay visible.
+        if point.is_nan() {
+            *self = Bounds { min: DVec3::NAN, max: DVec3::NAN };
+        }
+        self.min = self.min.min(point);
+        self.max = self.max.max(point);
+    }
+
+    /// Middle.
+    pub fn centre(&self) -> DVec3 {
+        (self.min + self.max) / 2.0
+    }
+
+    /// Radius of the sphere about the centre that holds it.
+    pub fn radius(&self) -> f64 {
+        (self.max - self.min).length() / 2.0
+    }
+
+    /// Whether both corners are finite.
+    pub fn is_finite(&self) -> bool {
+        self.min.is_finite() && self.max.is_finite()
+    }
+}
+
+/// What a scene has, as far as passes care. Decides what is pruned and how shaders are specialised.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SceneTraits {
+    /// Triangles of all instances.
+    pub triangles: usize,
+    /// Instances.
+    pub instances: usize,
+    /// Materials in use.
+    pub materials: usize,
+    /// Textures.
+    pub textures: usize,
+    /// Whether any material has a specular lobe.
+    pub specular: bool,
+    /// Smallest alpha of all specular lobes, textures included.
+    pub sharpest_alpha: Option<f32>,
+    /// Whether any material can be metallic.
+    pub metallic: bool,
+    /// Whether any material has a normal map.
+    pub normal_maps: bool,
+    /// Whether any material is cut out by alpha.
+    pub alpha_mask: bool,
+    /// Whether any material emits.
+    pub emissive: bool,
+    /// Whether any material has a base-colour texture.
+    pub base_color_textures: bool,
+    /// Whether any material has a metallic-roughness texture.
+    pub metallic_roughness_textures: bool,
+    /// Whether any material has an emission texture.
+    pub emissive_textures: bool,
+    /// Point lights.
+    pub point_lights: usize,
+    /// Spot lights.
+    pub spot_lights: usize,
+    /// Directional lights.
+    pub directional_lights: usize,
+    /// Point lights, and spots too wide for one face: each takes six faces of a shadow map.
+    pub cube_lights: usize,
+    /// Quad lights.
+    pub quad_lights: usize,
+    /// Disk lights.
+    pub disk_lights: usize,
+    /// Sphere lights.
+    pub sphere_lights: usize,
+    /// Whether there is an environment map.
+    pub environment: bool,
+    /// Whether anything moves.
+    pub animated: bool,
+    /// Length of the longest animation, seconds.
+    pub animation_seconds: f32,
+    /// Bounds of the geometry.
+    pub bounds: Bounds,
+    /// Normal distribution function.
+    pub ndf: Ndf,
+}
+
+impl SceneTraits {
+    /// Point, spot and directional lights.
+    pub fn punctual_lights(&self) -> usize {
+        self.point_lights + self.spot_lights + self.directional_lights
+    }
+
+    /// The same scene with every fact set that only permits leaving something out.
+    pub fn unspecialised(&self) -> Self {
+        Self {
+            specular: true,
+            metallic: true,
+            normal_maps: true,
+            alpha_mask: true,
+            emissive: true,
+            base_color_textures: true,
+            metallic_roughness_textures: true,
+            emissive_textures: true,
+            ..self.clone()
+        }
+    }
+
+    /// The facts in words, for printing.
+    pub fn facts(&self) -> Vec<(&'static str, String)> {
+        let yes = |on: bool| (if on { "yes" } else { "no" }).to_owned();
+        let size = self.bounds.max - self.bounds.min;
+        vec![
+            ("triangles", self.triangles.to_string()),
+            ("instances", self.instances.to_string()),
+            ("materials", self.materials.to_string()),
+            ("textures", self.textures.to_string()),
+            ("size (m)", format!("{:.3} x {:.3} x {:.3}", size.x, size.y, size.z)),
+            ("centre (m)", format!("{:.3}", self.bounds.centre())),
+            ("specular lobes", yes(self.specular)),
+            ("sharpest alpha", self.sharpest_alpha.map_or("-".into(), |alpha| format!("{alpha:.4}"))),
+            ("metallic", yes(self.metallic)),
+            ("normal maps", yes(self.normal_maps)),
+            ("alpha mask", yes(self.alpha_mask)),
+            ("emissive", yes(self.emissive)),
+            ("base-colour textures", yes(self.base_color_textures)),
+            ("metallic-roughness textures", yes(self.metallic_roughness_textures)),
+            ("emission textures", yes(self.emissive_textures)),
+            ("point lights", self.point_lights.to_string()),
+            ("spot lights", self.spot_lights.to_string()),
+            ("directional lights", self.directional_lights.to_string()),
+            ("quad lights", self.quad_lights.to_string()),
+            ("disk lights", self.disk_lights.to_string()),
+            ("sphere lights", self.sphere_lights.to_string()),
+            ("environment map", yes(self.environment)),
+            ("animation (s)", if self.animated { format!("{:.3}", self.animation_seconds) } else { "none".into() }),
+            ("normal distribution", self.ndf.to_string()),
+        ]
+    }
+}
+
+/// Least roughness factor of a material's texture.
+fn least_roughness(scene: &Scene, material: &Material) -> f32 {
+    let texture = material.metallic_roughness_texture.and_then(|reference| scene.textures.get(reference.texture));
+    let least = texture.and_then(|texture| texture.rgba.chunks_exact(4).map(|texel| texel[1]).min());
+    material.roughness * least.map_or(1.0, |green| f32::from(green) / 255.0)
+}
+
+pub(crate) fn of(scene: &Scene) -> SceneTraits {
+    let mut used = vec![false; scene.materials.len()];
+    let mut triangles = 0;
+    for instance in &scene.instances {
+        let mesh = &scene.meshes[instance.mesh];
+        used[mesh.material] = true;
+        triangles += mesh.indices.len() / 3;
+    }
+    let materials: Vec<&Material> = scene.materials.iter().zip(&used).filter(|(_, used)| **used).map(|(material, _)| material).collect();
+    let any = |fact: fn(&Material) -> bool| materials.iter().any(|material| fact(material));
+    let specular = materials.iter().filter(|material| material.specular > 0.0);
+    let alphas = specular.map(|material| least_roughness(scene, material).powi(2).max(MIN_ALPHA));
+    let lights = |fits: fn(&LightKind) -> bool| scene.lights.iter().filter(|light| fits(&light.kind)).count();
+    let area = |fits: fn(&AreaShape) -> bool| scene.area_lights.iter().filter(|light| fits(&light.shape)).count();
+    let wide = |kind: &LightKind| match kind {
+        LightKind::Point => true,
+        LightKind::Spot { outer, .. } => *outer > CUBE_FACE_OUTER,
+        LightKind::Directional => false,
+    };
+    SceneTraits {
+        triangles,
+        instances: scene.instances.len(),
+        materials: materials.len(),
+        textures: scene.textures.len(),
+        specular: any(|material| material.specular > 0.0),
+        sharpest_alpha: alphas.reduce(f32::min),
+        metallic: any(|material| material.metallic > 0.0),
+        normal_maps: any(|material| material.normal_texture.is_some()),
+        alpha_mask: any(|material| material.alpha_mode != AlphaMode::Opaque),
+        emissive: any(|material| material.emissive.max_element() > 0.0),
+        base_color_textures: any(|material| material.base_color_texture.is_some()),
+        metallic_roughness_textures: any(|material| material.metallic_roughness_texture.is_some()),
+        emissive_textures: any(|material| material.emissive_texture.is_some()),
+        point_lights: lights(|kind| matches!(kind, LightKind::Point)),
+        spot_lights: lights(|kind| matches!(kind, LightKind::Spot { .. })),
+        directional_lights: lights(|kind| matches!(kind, LightKind::Directional)),
+        cube_lights: scene.lights.iter().filter(|light| wide(&light.kind)).count(),
+        quad_lights: area(|shape| matches!(shape, AreaShape::Quad { .. })),
+        disk_lights: area(|shape| matches!(shape, AreaShape::Disk { .. })),
+        sphere_lights: area(|shape| matches!(shape, AreaShape::Sphere { .. })),
+        environment: scene.environment.is_some(),
+        animated: scene.nodes.is_animated(),
+        animation_seconds: scene.animation_seconds(),
+        bounds: scene.bounds(),
+        ndf: scene.ndf,
+    }
+}
