@@ -1,0 +1,149 @@
+// One thread per pixel, a loop over lights.
+
+#import lobelia::brdf::{brdf_from_surface, evaluate_brdf}
+#import lobelia::light::light_sample
+#import lobelia::math::{safe_normalize, storable}
+#import lobelia::octahedral::octahedral_unpack
+#import lobelia::reflective_shadow_map::{RsmFace, rsm_cube_face, rsm_direction_to_light, rsm_distance, rsm_project, rsm_ray, rsm_ray_origin}
+#import lobelia::scene::{PunctualLight, View, scene_position}
+#import lobelia::surface::{PackedSurface, unpack_surface}
+
+struct Settings {
+    light_count: u32,
+    face_count: u32,
+    // Width of the filter in texels.
+    filter_width: u32,
+    // Texels.
+    bias: f32,
+}
+
+@group(0) @binding(0) var<uniform> view: View;
+@group(0) @binding(1) var<uniform> settings: Settings;
+@group(0) @binding(2) var<storage, read> lights: array<PunctualLight>;
+@group(0) @binding(3) var gbuffer_depth: texture_depth_2d;
+@group(0) @binding(4) var gbuffer_core: texture_2d<u32>;
+#ifdef SPECULAR
+@group(0) @binding(5) var gbuffer_specular: texture_2d<u32>;
+#endif
+#ifdef NORMAL_MAP
+@group(0) @binding(6) var gbuffer_geometric_normal: texture_2d<u32>;
+#endif
+#ifdef SHADOWS
+@group(0) @binding(7) var<storage, read> faces: array<RsmFace>;
+@group(0) @binding(8) var rsm_depth: texture_depth_2d_array;
+#ifdef NORMAL_MAP
+@group(0) @binding(9) var rsm_normal: texture_2d_array<u32>;
+#else
+@group(0) @binding(9) var rsm_core: texture_2d_array<u32>;
+#endif
+#endif
+@group(0) @binding(10) var radiance: texture_storage_2d<rgba16float, write>;
+
+#ifdef SHADOWS
+fn caster_normal(texel: vec2u, layer: u32) -> vec3f {
+#ifdef NORMAL_MAP
+    return octahedral_unpack(textureLoad(rsm_normal, texel, layer, 0).x);
+#else
+    return octahedral_unpack(textureLoad(rsm_core, texel, layer, 0).x);
+#endif
+}
+
+// 1 if the light reaches the point past the surface in one texel, 0 if that surface stands before it.
+// `footprint` is the width of a texel at the point, metres; `distance` that of the point along the face's forward axis.
+fn texel_lit(face: RsmFace, layer: u32, texel: vec2u, uv: vec2f, distance: f32, footprint: f32, slack: f32) -> f32 {
+    let depth = textureLoad(rsm_depth, texel, layer, 0);
+    if depth <= 0.0 {
+        return 1.0;
+    }
+    let resolution = f32(textureDimensions(rsm_depth).x);
+    let caster = rsm_distance(face, depth);
+    let normal = caster_normal(texel, layer);
+    let texel_uv = (vec2f(texel) + vec2f(0.5)) / resolution;
+    let on_plane = rsm_ray_origin(face, texel_uv) + rsm_ray(face, texel_uv) * caster;
+    // Where the ray to the point meets the texel's plane.
+    let ray = rsm_ray(face, uv);
+    let descent = dot(ray, normal);
+    let rise = dot(on_plane - rsm_ray_origin(face, uv), normal);
+    // A plane seen edge-on says nothing about its neighbourhood; and no plane is trusted farther than a few texels from where it was seen.
+    let reach = 16.0 * footprint;
+    let met = select(caster, clamp(rise / descent, caster - reach, caster + reach), abs(descent) > 1e-4);
+    return select(0.0, 1.0, met >= distance - slack);
+}
+
+// Share of the filter's texels past which the light is seen.
+fn shadow(first: RsmFace, position: vec3f, geometric_normal: vec3f) -> f32 {
+    var layer = first.first_face;
+    if first.face_count == 6u {
+        layer += rsm_cube_face(position - first.position);
+    }
+    let face = faces[layer];
+    let resolution = f32(textureDimensions(rsm_depth).x);
+    let projected = rsm_project(face, position);
+    if projected.z <= 0.0 || any(projected.xy < vec2f(0.0)) || any(projected.xy > vec2f(1.0)) {
+        return 1.0;
+    }
+    let width_at_one = 2.0 * length(face.right) / resolution;
+    let footprint = select(width_at_one * projected.z, width_at_one, face.depth_range != 0.0);
+    let slack = settings.bias * footprint + projected.z * 2.44140625e-4;
+    let width = i32(settings.filter_width);
+    let corner = projected.xy * resolution - vec2f(0.5 * f32(width));
+    let base = vec2i(floor(corner));
+    let fraction = corner - vec2f(base);
+    let last = i32(resolution) - 1;
+    var lit = 0.0;
+    for (var y = 0; y <= width; y++) {
+        let weight_y = select(select(1.0, 1.0 - fraction.y, y == 0), fraction.y, y == width);
+        for (var x = 0; x <= width; x++) {
+            let weight_x = select(select(1.0, 1.0 - fraction.x, x == 0), fraction.x, x == width);
+            let texel = vec2u(clamp(base + vec2i(x, y), vec2i(0), vec2i(last)));
+            lit += weight_x * weight_y * texel_lit(face, layer, texel, projected.xy, projected.z, footprint, slack);
+        }
+    }
+    return clamp(lit / f32(width * width), 0.0, 1.0);
+}
+#endif
+
+@compute @workgroup_size(8, 8)
+fn direct(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= textureDimensions(radiance)) {
+        return;
+    }
+    let depth = textureLoad(gbuffer_depth, id.xy, 0);
+    if depth <= 0.0 {
+        textureStore(radiance, id.xy, vec4f(0.0, 0.0, 0.0, 1.0));
+        return;
+    }
+    var packed: PackedSurface;
+    packed.core = textureLoad(gbuffer_core, id.xy, 0).xy;
+#ifdef SPECULAR
+    packed.specular = textureLoad(gbuffer_specular, id.xy, 0).x;
+#endif
+#ifdef NORMAL_MAP
+    packed.geometric_normal = textureLoad(gbuffer_geometric_normal, id.xy, 0).x;
+#endif
+    let surface = unpack_surface(packed);
+    let brdf = brdf_from_surface(surface);
+    let position = scene_position(view, vec2f(id.xy), depth);
+    let to_viewer = safe_normalize(view.position - position, surface.normal);
+    var total = vec3f(0.0);
+#ifdef SHADOWS
+    // Faces of one light follow each other; the first knows the light.
+    for (var index = 0u; index < settings.face_count; index += max(faces[index].face_count, 1u)) {
+        let light = lights[faces[index].light];
+#else
+    for (var index = 0u; index < settings.light_count; index += 1u) {
+        let light = lights[index];
+#endif
+        let incident = light_sample(light, position);
+        let cosine = dot(surface.normal, incident.direction);
+        if cosine > 0.0 && max(max(incident.irradiance.x, incident.irradiance.y), incident.irradiance.z) > 0.0 {
+            let f = evaluate_brdf(brdf, surface.normal, surface.geometric_normal, incident.direction, to_viewer);
+            var reflected = f * incident.irradiance * cosine;
+#ifdef SHADOWS
+            reflected *= shadow(faces[index], position, surface.geometric_normal);
+#endif
+            total += min(reflected, vec3f(1e30));
+        }
+    }
+    textureStore(radiance, id.xy, vec4f(storable(total), 1.0));
+}
