@@ -1,0 +1,31 @@
+// Radiance to display colours.
+
+#import lobelia::tonemap::{MAX_INPUT, aces, agx, srgb_encode}
+
+struct Settings {
+    // 2^stops.
+    exposure: f32,
+    padding_a: f32,
+    padding_b: f32,
+    padding_c: f32,
+}
+
+@group(0) @binding(0) var<uniform> settings: Settings;
+@group(0) @binding(1) var radiance: texture_2d<f32>;
+@group(0) @binding(2) var picture: texture_storage_2d<rgba8unorm, write>;
+
+@compute @workgroup_size(8, 8)
+fn tonemap(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= textureDimensions(picture)) {
+        return;
+    }
+    let exposed = min(textureLoad(radiance, id.xy, 0).rgb * settings.exposure, vec3f(MAX_INPUT));
+#if CURVE == 1
+    let mapped = aces(exposed);
+#else if CURVE == 2
+    let mapped = agx(exposed);
+#else
+    let mapped = exposed;
+#endif
+    textureStore(picture, id.xy, vec4f(srgb_encode(mapped), 1.0));
+}

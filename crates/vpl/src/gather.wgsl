@@ -1,0 +1,202 @@
+// Gathers virtual point lights at every pixel.
+//
+// A workgroup is 8 x 8 pixels that share one subset of the lights. Lights are unpacked once per workgroup, 32 at a time (one word of visibility), into
+// workgroup memory. Sums are kept in 32-bit floats, so that any number of dispatches adds up without loss; `resolve` writes the radiance.
+
+#import lobelia::brdf::{Brdf, brdf_from_surface, evaluate_brdf}
+#import lobelia::light_visibility::{interleaved_light, interleaved_pixel, visibility_address}
+#import lobelia::math::{safe_normalize, storable}
+#import lobelia::scene::{View, scene_position, view_depth}
+#import lobelia::surface::{PackedSurface, Surface, unpack_surface}
+#import lobelia::virtual_lights::{VirtualLight, virtual_light_normal, virtual_light_surface}
+
+struct Settings {
+    light_count: u32,
+    interleave: u32,
+    // 0: visibility is not interleaved, so a light's bit stands at its own index.
+    visibility_interleaved: u32,
+    // Upper bound of the geometry term, 1/m^2.
+    clamp: f32,
+    // Least squared distance that counts, m^2.
+    least_distance_squared: f32,
+    padding_a: u32,
+    padding_b: u32,
+    padding_c: u32,
+}
+
+// Changes from dispatch to dispatch.
+struct Range {
+    // Words of 32 lights of each pixel's subset.
+    first_word: u32,
+    end_word: u32,
+    // First word of the visibility chunk that is bound.
+    chunk_word: u32,
+    // 1: the sums start here.
+    first: u32,
+}
+
+@group(0) @binding(0) var<uniform> view: View;
+@group(0) @binding(1) var<uniform> settings: Settings;
+@group(0) @binding(2) var<uniform> range: Range;
+@group(0) @binding(3) var<storage, read> virtual_lights: array<VirtualLight>;
+@group(0) @binding(4) var gbuffer_depth: texture_depth_2d;
+@group(0) @binding(5) var gbuffer_core: texture_2d<u32>;
+#ifdef SPECULAR
+@group(0) @binding(6) var gbuffer_specular: texture_2d<u32>;
+#endif
+#ifdef NORMAL_MAP
+@group(0) @binding(7) var gbuffer_geometric_normal: texture_2d<u32>;
+#endif
+#ifdef VISIBILITY
+@group(0) @binding(8) var<storage, read> visibility: array<u32>;
+#endif
+@group(0) @binding(9) var<storage, read_write> sums: array<vec4f>;
+@group(0) @binding(10) var radiance: texture_storage_2d<rgba16float, write>;
+
+struct SharedLight {
+    position: vec3f,
+    flux: vec3f,
+    normal: vec3f,
+    geometric_normal: vec3f,
+    to_source: vec3f,
+    brdf: Brdf,
+}
+
+var<workgroup> shared_lights: array<SharedLight, 32>;
+
+fn load_surface(pixel: vec2u) -> Surface {
+    var packed: PackedSurface;
+    packed.core = textureLoad(gbuffer_core, pixel, 0).xy;
+#ifdef SPECULAR
+    packed.specular = textureLoad(gbuffer_specular, pixel, 0).x;
+#endif
+#ifdef NORMAL_MAP
+    packed.geometric_normal = textureLoad(gbuffer_geometric_normal, pixel, 0).x;
+#endif
+    return unpack_surface(packed);
+}
+
+fn share_light(slot: u32, index: u32) {
+    var entry: SharedLight;
+    if index < settings.light_count {
+        let light = virtual_lights[index];
+        let surface = virtual_light_surface(light);
+        entry.position = light.position;
+        entry.flux = light.flux;
+        entry.normal = surface.normal;
+        entry.geometric_normal = surface.geometric_normal;
+        entry.to_source = light.direction_to_source;
+        entry.brdf = brdf_from_surface(surface);
+    }
+    shared_lights[slot] = entry;
+}
+
+// What one light adds to the radiance of a surface.
+fn contribution(slot: u32, position: vec3f, surface: Surface, brdf: Brdf, to_viewer: vec3f) -> vec3f {
+    let light_position = shared_lights[slot].position;
+    let offset = light_position - position;
+    let distance_squared = max(dot(offset, offset), settings.least_distance_squared);
+    let direction = safe_normalize(offset, surface.normal);
+    let cosines = max(dot(surface.normal, direction), 0.0) * max(-dot(shared_lights[slot].normal, direction), 0.0);
+    if cosines <= 0.0 {
+        return vec3f(0.0);
+    }
+    let geometry = min(cosines / distance_squared, settings.clamp);
+    let emitted = evaluate_brdf(shared_lights[slot].brdf, shared_lights[slot].normal, shared_lights[slot].geometric_normal, shared_lights[slot].to_source, -direction);
+    let reflected = evaluate_brdf(brdf, surface.normal, surface.geometric_normal, direction, to_viewer);
+    return min(shared_lights[slot].flux * emitted * reflected * geometry, vec3f(1e30));
+}
+
+@compute @workgroup_size(8, 8)
+fn gather(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) local: u32) {
+    let extent = vec2u(view.extent);
+    let place = interleaved_pixel(id.xy, extent, settings.interleave);
+    var depth = 0.0;
+    var surface: Surface;
+    if place.inside {
+        depth = textureLoad(gbuffer_depth, place.pixel, 0);
+        surface = load_surface(place.pixel);
+    }
+    let position = scene_position(view, vec2f(place.pixel), max(depth, 1e-30));
+    let to_viewer = safe_normalize(view.position - position, surface.normal);
+    let brdf = brdf_from_surface(surface);
+    var total = vec3f(0.0);
+    for (var word = range.first_word; word < range.end_word; word++) {
+        workgroupBarrier();
+        if local < 32u {
+            share_light(local, interleaved_light(word * 32u + local, place.subset, settings.interleave));
+        }
+        workgroupBarrier();
+        if depth > 0.0 {
+#ifdef VISIBILITY
+            var bits = 0u;
+            if settings.visibility_interleaved == 1u || settings.interleave == 1u {
+                bits = visibility[visibility_address(place.pixel, extent, word - range.chunk_word)];
+            } else {
+                for (var slot = 0u; slot < 32u; slot++) {
+                    let index = interleaved_light(word * 32u + slot, place.subset, settings.interleave);
+                    if index < settings.light_count {
+                        bits |= ((visibility[visibility_address(place.pixel, extent, index / 32u)] >> (index % 32u)) & 1u) << slot;
+                    }
+                }
+            }
+#else
+            let bits = 0xffffffffu;
+#endif
+            if bits != 0u {
+                for (var slot = 0u; slot < 32u; slot++) {
+                    if ((bits >> slot) & 1u) == 1u {
+                        total += contribution(slot, position, surface, brdf, to_viewer);
+                    }
+                }
+            }
+        }
+    }
+    if place.inside {
+        let address = place.pixel.y * extent.x + place.pixel.x;
+        let before = select(sums[address].xyz, vec3f(0.0), range.first == 1u);
+        sums[address] = vec4f(min(before + total, vec3f(1e30)), depth);
+    }
+}
+
+// Radiance of a pixel: its own sum, or with interleaving the mean over the k x k block around it, which together knows every light. Pixels of the
+// block that lie on another surface (other normal, or off the plane) do not count.
+@compute @workgroup_size(8, 8)
+fn resolve(@builtin(global_invocation_id) id: vec3u) {
+    let extent = vec2u(view.extent);
+    if any(id.xy >= extent) {
+        return;
+    }
+    let own = sums[id.y * extent.x + id.x];
+    var result = own.xyz;
+#ifdef INTERLEAVED
+    if own.w > 0.0 {
+        let side = i32(settings.interleave);
+        let surface = load_surface(id.xy);
+        let position = scene_position(view, vec2f(id.xy), own.w);
+        let tolerance = 0.02 * view_depth(view, own.w);
+        var total = vec3f(0.0);
+        var count = 0.0;
+        for (var y = 0; y < side; y++) {
+            for (var x = 0; x < side; x++) {
+                let other_pixel = vec2i(id.xy) + vec2i(x, y) - vec2i(side / 2);
+                if all(other_pixel >= vec2i(0)) && all(other_pixel < vec2i(extent)) {
+                    let other = sums[u32(other_pixel.y) * extent.x + u32(other_pixel.x)];
+                    if other.w > 0.0 {
+                        let other_surface = load_surface(vec2u(other_pixel));
+                        let other_position = scene_position(view, vec2f(other_pixel), other.w);
+                        let off_plane = abs(dot(other_position - position, surface.geometric_normal));
+                        if dot(other_surface.normal, surface.normal) > 0.9 && off_plane < tolerance {
+                            total += other.xyz;
+                            count += 1.0;
+                        }
+                    }
+                }
+            }
+        }
+        // The pixel itself always counts.
+        result = total * (f32(side * side) / max(count, 1.0));
+    }
+#endif
+    textureStore(radiance, id.xy, vec4f(storable(select(vec3f(0.0), result, own.w > 0.0)), 1.0));
+}
