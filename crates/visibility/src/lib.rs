@@ -1,1 +1,22 @@
-//! Under construction.
+//! Which virtual lights each pixel sees, found by tracing shadow rays: exact, up to the scene's triangles.
+//!
+//! Imperfect shadow maps and their like approximate this; with exact visibility beside them, a technique's own error can be told from that of its
+//! shadows. A bounding volume hierarchy over the scene's triangles is built on the CPU (by the `obvhs` crate: PLOC with reinsertion) and laid out
+//! for the device in depth-first order with skip links, so that traversal needs no stack: a node that is missed is left by its link
+//! (Smits 1998, *Efficiency Issues for Ray Tracing*). Shadow rays stop at the first hit, so the order of children does not matter.
+//!
+//! Triangles block from both sides; alpha masks are not looked at (a cut-out surface casts the shadow of the whole).
+
+mod hierarchy;
+mod visibility;
+
+pub use hierarchy::Hierarchy;
+pub use visibility::{Params, VisibilityPass};
+
+use lobelia_frame::SceneWorld;
+use lobelia_graph::Registry;
+
+/// Adds the passes of this crate.
+pub fn register(registry: &mut Registry<SceneWorld>) {
+    registry.add::<VisibilityPass>();
+}
