@@ -80,7 +80,7 @@ impl Failure {
 
 /// One problem as a diagnostic with its piece of the file.
 struct Shown<'a> {
-    source: NamedSource<&'a str>,
+    source: NamedSource<String>,
     problem: &'a Problem,
     title: String,
 }
@@ -124,7 +124,7 @@ fn shown(problems: &Problems, problem: &Problem) -> String {
         }
         None => problem.message.clone(),
     };
-    let shown = Shown { source: NamedSource::new(&problems.file, problems.text.as_str()), problem, title };
+    let shown = Shown { source: NamedSource::new(&problems.file, problems.text.clone()), problem, title };
     let coloured = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
     let theme = if coloured { GraphicalTheme::unicode() } else { GraphicalTheme::unicode_nocolor() };
     let mut text = String::from("error: ");

@@ -2,7 +2,7 @@
 
 use lobelia_frame::{DisplayImage, Radiance, SceneWorld};
 use lobelia_graph::{
-    FrameReport, Gpu, GpuError, GpuOptions, Plan, PlanOptions, Problems, Resource, RunError, RunOptions, Runner, Timing, Wired,
+    FrameReport, Gpu, GpuError, GpuOptions, Plan, PlanOptions, Problems, Resource, RunError, RunOptions, Runner, Wired,
 };
 use lobelia_measure::Image;
 use lobelia_scene::{

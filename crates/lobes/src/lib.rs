@@ -1,1 +1,14 @@
-//! Under construction.
+//! The mathematics that several rooms share, in `f64` and without a device: reflectance, falloff, encodings, point sets, tone curves.
+//!
+//! Every function that also exists in WGSL has the same name there; a device test (`tests/tests/twins.rs`) holds the two together over the whole domain.
+
+pub mod brdf;
+pub mod light;
+pub mod octahedral;
+pub mod sampling;
+pub mod tonemap;
+
+/// Relative luminance of linear Rec. 709 colour.
+pub fn luminance(color: glam::DVec3) -> f64 {
+    color.dot(glam::DVec3::new(0.2126, 0.7152, 0.0722))
+}

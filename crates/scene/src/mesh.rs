@@ -1,6 +1,6 @@
 //! Triangle meshes.
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 
 /// An indexed triangle mesh. All arrays but `indices` have one element per vertex.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -75,6 +75,29 @@ impl Mesh {
                 [(b - a).cross(c - a).normalize_or_zero().as_vec3(); 3]
             })
             .collect();
+    }
+
+    /// Replaces zero normals by those of the triangles around them, weighted by area, and returns how many there were.
+    pub(crate) fn mend_normals(&mut self) -> usize {
+        let zero: Vec<bool> = self.normals.iter().map(|normal| *normal == Vec3::ZERO).collect();
+        let count = zero.iter().filter(|zero| **zero).count();
+        if count == 0 {
+            return 0;
+        }
+        let mut sums = vec![DVec3::ZERO; self.normals.len()];
+        for corners in self.indices.chunks_exact(3) {
+            let [a, b, c] = [0, 1, 2].map(|corner| self.positions[corners[corner] as usize].as_dvec3());
+            for corner in corners {
+                sums[*corner as usize] += (b - a).cross(c - a);
+            }
+        }
+        for ((normal, zero), sum) in self.normals.iter_mut().zip(zero).zip(sums) {
+            if zero {
+                // Where triangles cancel, or none is left, any direction is as good as another.
+                *normal = sum.try_normalize().unwrap_or(DVec3::Y).as_vec3();
+            }
+        }
+        count
     }
 
     /// Fills what no file gave with zeros, so that all arrays are as long as the positions.

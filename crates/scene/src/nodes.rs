@@ -65,15 +65,15 @@ impl NodeTree {
         world
     }
 
-    /// Whether an animation moves a node, itself or through what it hangs below.
-    pub fn moves(&self, node: usize) -> bool {
-        let mut current = Some(node);
-        while let Some(index) = current {
-            if self.channels.iter().any(|channel| channel.node == index) {
-                return true;
-            }
-            current = self.nodes[index].parent;
+    /// For each node, whether an animation moves it, itself or through what it hangs below.
+    pub fn moving(&self) -> Vec<bool> {
+        let mut moving = vec![false; self.nodes.len()];
+        for channel in &self.channels {
+            moving[channel.node] = true;
         }
-        false
+        for (index, node) in self.nodes.iter().enumerate() {
+            moving[index] |= node.parent.is_some_and(|parent| moving[parent]);
+        }
+        moving
     }
 }

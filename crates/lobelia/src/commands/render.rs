@@ -299,7 +299,7 @@ fn report(arguments: &Arguments, rendering: &Rendering<'_>, timing: Timing) -> R
         return Ok(());
     }
     let mut table = Table::new();
-    table.load_preset(presets::NOTHING).set_header(["pass", "kind", "device ms", "CPU ms", "MiB"]);
+    table.load_style(presets::NOTHING).set_header(["pass", "kind", "device ms", "CPU ms", "MiB"]);
     for column in 2..5 {
         if let Some(column) = table.column_mut(column) {
             column.set_cell_alignment(CellAlignment::Right);

@@ -2,23 +2,45 @@
 
 use super::read_uri;
 use crate::SceneError;
-use gltf::accessor::{DataType, Dimensions};
+use gltf::accessor::{
+    DataType,
+    sparse::{IndexType, Sparse},
+};
 use std::path::Path;
+
+/// Where elements lie in a buffer view, bytes.
+#[derive(Clone, Copy)]
+struct Layout {
+    offset: usize,
+    stride: usize,
+    element: usize,
+    count: usize,
+}
+
+/// Most bytes that all buffers together may have.
+const MAX_BYTES: usize = 1 << 30;
 
 /// The bytes of all buffers.
 pub(crate) struct Buffers(Vec<Vec<u8>>);
 
 impl Buffers {
-    pub fn load(gltf: &gltf::Gltf, shown: &str, folder: Option<&Path>) -> Result<Self, SceneError> {
+    pub fn load(gltf: &mut gltf::Gltf, shown: &str, folder: Option<&Path>) -> Result<Self, SceneError> {
+        let mut blob = gltf.blob.take();
         let mut buffers = Vec::new();
+        let mut total = 0;
         for buffer in gltf.buffers() {
             let fail = |message: String| SceneError::content(shown, format!("buffer {}: {message}", buffer.index()));
             let bytes = match buffer.source() {
-                gltf::buffer::Source::Bin => gltf.blob.clone().ok_or_else(|| fail("the file has no binary chunk".into()))?,
+                gltf::buffer::Source::Bin if buffer.index() > 0 => return Err(fail("it has no uri; only buffer 0 may be the binary chunk".into())),
+                gltf::buffer::Source::Bin => blob.take().ok_or_else(|| fail("it has no uri and the file no binary chunk".into()))?,
                 gltf::buffer::Source::Uri(uri) => read_uri(uri, folder).map_err(fail)?,
             };
             if bytes.len() < buffer.length() {
                 return Err(fail(format!("{} bytes are declared, but only {} are there", buffer.length(), bytes.len())));
+            }
+            total += bytes.len();
+            if total > MAX_BYTES {
+                return Err(fail(format!("the buffers have more than {MAX_BYTES} bytes")));
             }
             buffers.push(bytes);
         }
@@ -43,7 +65,7 @@ impl Buffers {
     }
 
     /// Elements of an accessor, each as `width` numbers. Integers that are marked as normalised become [0, 1] or [-1, 1].
-    fn elements<T>(
+    fn elements<T: Copy>(
         &self,
         shown: &str,
         accessor: &gltf::Accessor<'_>,
@@ -51,42 +73,72 @@ impl Buffers {
         convert: impl Fn(DataType, bool, &[u8]) -> T,
     ) -> Result<Vec<T>, SceneError> {
         let fail = |message: String| SceneError::content(shown, format!("accessor {}: {message}", accessor.index()));
-        let found = match accessor.dimensions() {
-            Dimensions::Scalar => 1,
-            Dimensions::Vec2 => 2,
-            Dimensions::Vec3 => 3,
-            Dimensions::Vec4 | Dimensions::Mat2 => 4,
-            Dimensions::Mat3 => 9,
-            Dimensions::Mat4 => 16,
-        };
+        let found = accessor.dimensions().multiplicity();
         if found != width {
             return Err(fail(format!("it has {found} numbers per element, but {width} are needed")));
         }
-        if accessor.sparse().is_some() {
-            return Err(fail("it is sparse, which is not supported; write it out densely".into()));
-        }
         let view = accessor.view().ok_or_else(|| fail("it has no buffer view".into()))?;
-        let bytes = self.view(shown, &view)?;
         let component = accessor.data_type().size();
         let element = component * width;
         let stride = view.stride().unwrap_or(element);
-        let (count, offset) = (accessor.count(), accessor.offset());
         if stride < element {
             return Err(fail(format!("its stride of {stride} bytes is less than an element of {element}")));
         }
-        let last = count.checked_sub(1).and_then(|last| last.checked_mul(stride)).and_then(|last| last.checked_add(element));
-        let end = last.and_then(|last| last.checked_add(offset));
-        if end.is_none_or(|end| end > bytes.len()) {
-            return Err(fail(format!("{count} elements of {element} bytes do not fit into the {} bytes of buffer view {}", bytes.len(), view.index())));
+        let layout = Layout { offset: accessor.offset(), stride, element, count: accessor.count() };
+        let bytes = self.run(shown, accessor, &view, layout)?;
+        let number = |bytes: &[u8]| convert(accessor.data_type(), accessor.normalized(), bytes);
+        let mut values: Vec<T> = Vec::with_capacity(layout.count * width);
+        for start in (0..layout.count).map(|index| index * stride) {
+            values.extend(bytes[start..start + element].chunks_exact(component).map(number));
         }
-        let mut values = Vec::with_capacity(count * width);
-        for index in 0..count {
-            let start = offset + index * stride;
-            for number in bytes[start..start + element].chunks_exact(component) {
-                values.push(convert(accessor.data_type(), accessor.normalized(), number));
+        if let Some(sparse) = accessor.sparse() {
+            let count = sparse.count();
+            let places = self.sparse_places(shown, accessor, &sparse)?;
+            let layout = Layout { offset: sparse.values().offset(), stride: element, element, count };
+            let bytes = self.run(shown, accessor, &sparse.values().view(), layout)?;
+            for (place, bytes) in places.into_iter().zip(bytes.chunks_exact(element)) {
+                let target = values.get_mut(place * width..(place + 1) * width);
+                let target = target.ok_or_else(|| fail(format!("it is sparse and replaces element {place} of {}", accessor.count())))?;
+                for (target, bytes) in target.iter_mut().zip(bytes.chunks_exact(component)) {
+                    *target = number(bytes);
+                }
             }
         }
         Ok(values)
+    }
+
+    /// The indices of those elements that a sparse accessor replaces.
+    fn sparse_places(&self, shown: &str, accessor: &gltf::Accessor<'_>, sparse: &Sparse<'_>) -> Result<Vec<usize>, SceneError> {
+        let indices = sparse.indices();
+        let element = match indices.index_type() {
+            IndexType::U8 => 1,
+            IndexType::U16 => 2,
+            IndexType::U32 => 4,
+        };
+        let layout = Layout { offset: indices.offset(), stride: element, element, count: sparse.count() };
+        let bytes = self.run(shown, accessor, &indices.view(), layout)?;
+        let number = |bytes: &[u8]| bytes.iter().rev().fold(0, |number, byte| number << 8 | usize::from(*byte));
+        Ok(bytes.chunks_exact(element).map(number).collect())
+    }
+
+    /// The bytes from the first to the last of a run of elements in a view.
+    fn run(&self, shown: &str, accessor: &gltf::Accessor<'_>, view: &gltf::buffer::View<'_>, layout: Layout) -> Result<&[u8], SceneError> {
+        let Layout { offset, stride, element, count } = layout;
+        let bytes = self.view(shown, view)?;
+        let length = match count.checked_sub(1) {
+            Some(last) => last.checked_mul(stride).and_then(|last| last.checked_add(element)),
+            None => Some(0),
+        };
+        let end = length.and_then(|length| length.checked_add(offset));
+        end.and_then(|end| bytes.get(offset..end)).ok_or_else(|| {
+            let message = format!(
+                "accessor {}: {count} elements of {element} bytes do not fit into the {} bytes of buffer view {}",
+                accessor.index(),
+                bytes.len(),
+                view.index()
+            );
+            SceneError::content(shown, message)
+        })
     }
 
     /// Floats of an accessor, `width` per element.

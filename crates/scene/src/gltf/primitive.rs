@@ -45,7 +45,11 @@ pub(crate) fn read(
         same_length("TEXCOORD_0", uvs.len() / 2)?;
         mesh.uvs = uvs.chunks_exact(2).map(Vec2::from_slice).collect();
     }
-    let tangents = if needs_tangents { numbers(&Semantic::Tangents, 4)? } else { None };
+    if primitive.get(&Semantic::Colors(0)).is_some() {
+        warnings.push("vertex colours are ignored".to_owned());
+    }
+    // Tangents mean nothing without the normals they belong to (glTF 2.0, section 3.7.2.1).
+    let tangents = if needs_tangents && normals.is_some() { numbers(&Semantic::Tangents, 4)? } else { None };
     if let Some(tangents) = &tangents {
         same_length("TANGENT", tangents.len() / 4)?;
         mesh.tangents = tangents.chunks_exact(4).map(Vec4::from_slice).collect();
@@ -67,6 +71,8 @@ pub(crate) fn read(
     }
     if normals.is_none() {
         mesh.flat_normals();
+    } else if let missing @ 1.. = mesh.mend_normals() {
+        warnings.push(format!("{at}: {missing} normals are zero and replaced by those of their triangles"));
     }
     if needs_tangents && tangents.is_none() && (mesh.uvs.is_empty() || !tangents::generate(&mut mesh)) {
         warnings.push(format!("{at}: its normal map is ignored, for it has no usable texture coordinates"));
