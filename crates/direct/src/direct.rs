@@ -2,8 +2,8 @@
 
 use lobelia_frame::{GBuffer, ImageShape, Radiance, ReflectiveShadowMap, SceneWorld};
 use lobelia_graph::{
-    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, Pass, PlanContext, PortError, Ports, RunError,
-    Specialisation, TraitsOf,
+    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, ParamValue, Pass, PlanContext, PortError, Ports,
+    RunError, Specialisation, TraitsOf,
 };
 use lobelia_scene::Ndf;
 use lobelia_shaders::Source;
@@ -13,6 +13,23 @@ use serde::{Deserialize, Serialize};
 pub struct DirectPass {
     pipeline: ComputePipeline,
     settings: wgpu::Buffer,
+}
+
+/// What a texel of a shadow map stands for when a point is compared against it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Comparison {
+    /// A piece of the plane through the texel's surface: its depth where the ray to the point meets it.
+    #[default]
+    Plane,
+    /// Its depth everywhere, as in plain percentage-closer filtering; the bias grows with the slope of the receiver.
+    Depth,
+}
+
+impl ParamValue for Comparison {
+    fn kind() -> String {
+        "plane or depth".into()
+    }
 }
 
 /// Parameters of `direct`.
@@ -25,11 +42,13 @@ pub struct Params {
     /// Distance by which a caster must stand before a surface to shade it. Flat surfaces need none; it covers curvature within a texel.
     #[param(unit = "texels", range = 0.0..=16.0)]
     pub bias: f32,
+    /// How a texel shades: `plane` needs next to no bias; `depth` is the plain test, for comparison.
+    pub comparison: Comparison,
 }
 
 impl Default for Params {
     fn default() -> Self {
-        Self { filter_width: 1, bias: 0.5 }
+        Self { filter_width: 1, bias: 0.5, comparison: Comparison::Plane }
     }
 }
 
@@ -87,6 +106,8 @@ impl Pass for DirectPass {
         let mut found = reflectance_flags(flags.specular, flags.normal_map, context.traits.ndf);
         let shadows = inputs.rsm.is_some();
         found.push(Specialisation::new("SHADOWS", shadows, if shadows { "a shadow map is connected" } else { "no shadow map is connected" }));
+        let depth = shadows && context.params.comparison == Comparison::Depth;
+        found.push(Specialisation::new("DEPTH_COMPARISON", depth, if depth { "comparison: depth" } else { "texels count as planes, or not at all" }));
         found
     }
 

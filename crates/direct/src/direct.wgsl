@@ -40,6 +40,9 @@ struct Settings {
 @group(0) @binding(10) var radiance: texture_storage_2d<rgba16float, write>;
 
 #ifdef SHADOWS
+// Slopes, in texels of depth per texel, beyond which neither a texel's plane nor a receiver is believed.
+const MAX_SLOPE: f32 = 16.0;
+
 fn caster_normal(texel: vec2u, layer: u32) -> vec3f {
 #ifdef NORMAL_MAP
     return octahedral_unpack(textureLoad(rsm_normal, texel, layer, 0).x);
@@ -48,26 +51,21 @@ fn caster_normal(texel: vec2u, layer: u32) -> vec3f {
 #endif
 }
 
-// 1 if the light reaches the point past the surface in one texel, 0 if that surface stands before it.
-// `footprint` is the width of a texel at the point, metres; `distance` that of the point along the face's forward axis.
-fn texel_lit(face: RsmFace, layer: u32, texel: vec2u, uv: vec2f, distance: f32, footprint: f32, slack: f32) -> f32 {
-    let depth = textureLoad(rsm_depth, texel, layer, 0);
-    if depth <= 0.0 {
-        return 1.0;
-    }
-    let resolution = f32(textureDimensions(rsm_depth).x);
+// How far the surface in one texel reaches up along the ray to the point at `uv`: distance along the face's forward axis, metres.
+// `reach` is how far the texel's plane is trusted, metres.
+fn caster_distance(face: RsmFace, layer: u32, texel: vec2u, uv: vec2f, depth: f32, reach: f32) -> f32 {
     let caster = rsm_distance(face, depth);
+#ifdef DEPTH_COMPARISON
+    return caster;
+#else
     let normal = caster_normal(texel, layer);
-    let texel_uv = (vec2f(texel) + vec2f(0.5)) / resolution;
+    let texel_uv = (vec2f(texel) + vec2f(0.5)) / f32(textureDimensions(rsm_depth).x);
     let on_plane = rsm_ray_origin(face, texel_uv) + rsm_ray(face, texel_uv) * caster;
-    // Where the ray to the point meets the texel's plane.
-    let ray = rsm_ray(face, uv);
-    let descent = dot(ray, normal);
+    let descent = dot(rsm_ray(face, uv), normal);
     let rise = dot(on_plane - rsm_ray_origin(face, uv), normal);
-    // A plane seen edge-on says nothing about its neighbourhood; and no plane is trusted farther than a few texels from where it was seen.
-    let reach = 16.0 * footprint;
-    let met = select(caster, clamp(rise / descent, caster - reach, caster + reach), abs(descent) > 1e-4);
-    return select(0.0, 1.0, met >= distance - slack);
+    // A plane seen edge-on says nothing about its neighbourhood.
+    return select(caster, clamp(rise / descent, caster - reach, caster + reach), abs(descent) > 1e-4);
+#endif
 }
 
 // Share of the filter's texels past which the light is seen.
@@ -84,7 +82,12 @@ fn shadow(first: RsmFace, position: vec3f, geometric_normal: vec3f) -> f32 {
     }
     let width_at_one = 2.0 * length(face.right) / resolution;
     let footprint = select(width_at_one * projected.z, width_at_one, face.depth_range != 0.0);
-    let slack = settings.bias * footprint + projected.z * 2.44140625e-4;
+    var slack = settings.bias * footprint + projected.z * 2.44140625e-4;
+#ifdef DEPTH_COMPARISON
+    // Over one texel the receiver's own depth changes by the tangent of its slope.
+    let cosine = abs(dot(geometric_normal, rsm_direction_to_light(face, position)));
+    slack += settings.bias * footprint * min(sqrt(max(1.0 - cosine * cosine, 0.0)) / max(cosine, 1e-3), MAX_SLOPE);
+#endif
     let width = i32(settings.filter_width);
     let corner = projected.xy * resolution - vec2f(0.5 * f32(width));
     let base = vec2i(floor(corner));
@@ -96,7 +99,10 @@ fn shadow(first: RsmFace, position: vec3f, geometric_normal: vec3f) -> f32 {
         for (var x = 0; x <= width; x++) {
             let weight_x = select(select(1.0, 1.0 - fraction.x, x == 0), fraction.x, x == width);
             let texel = vec2u(clamp(base + vec2i(x, y), vec2i(0), vec2i(last)));
-            lit += weight_x * weight_y * texel_lit(face, layer, texel, projected.xy, projected.z, footprint, slack);
+            let depth = textureLoad(rsm_depth, texel, layer, 0);
+            if depth <= 0.0 || caster_distance(face, layer, texel, projected.xy, depth, MAX_SLOPE * footprint) >= projected.z - slack {
+                lit += weight_x * weight_y;
+            }
         }
     }
     return clamp(lit / f32(width * width), 0.0, 1.0);

@@ -13,7 +13,7 @@
 
 mod direct;
 
-pub use direct::{DirectPass, Params};
+pub use direct::{Comparison, DirectPass, Params};
 
 use lobelia_frame::SceneWorld;
 use lobelia_graph::Registry;

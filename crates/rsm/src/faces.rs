@@ -1,5 +1,6 @@
 //! How lights see: their faces.
 
+use encase::StorageBuffer;
 use glam::{DMat4, DVec3, DVec4};
 use lobelia_frame::RsmFace;
 use lobelia_scene::{CUBE_FACE_OUTER, LightKind, PunctualLight, Scene, SceneTraits};
@@ -9,11 +10,24 @@ pub fn count(traits: &SceneTraits) -> usize {
     traits.punctual_lights() - traits.cube_lights + 6 * traits.cube_lights
 }
 
+/// [`all`] as the device reads them.
+pub fn bytes(scene: &Scene) -> Vec<u8> {
+    let mut bytes = StorageBuffer::new(Vec::<u8>::new());
+    match bytes.write(&all(scene)) {
+        Ok(()) => bytes.into_inner(),
+        // Writing to a Vec fails only if it cannot grow, which aborts.
+        Err(_) => Vec::new(),
+    }
+}
+
 /// Near plane as a fraction of the scene's radius. Depth is reverse-Z float, so a near plane this close costs no precision.
 const NEAR: f64 = 1e-3;
 
 /// A face is this much wider than the cone it serves, so that filtering at the cone's rim stays inside.
 const MARGIN: f64 = 1.02;
+
+/// Least tangent of a spot's half angle: even a beam without width has a face.
+const LEAST_TANGENT: f64 = 1e-4;
 
 /// Forward and up of a cube's faces in the order +X -X +Y -Y +Z -Z.
 const CUBE: [(DVec3, DVec3); 6] = [
@@ -36,7 +50,8 @@ pub fn all(scene: &Scene) -> Vec<RsmFace> {
         let views: Vec<View> = match light.kind {
             LightKind::Directional => vec![directional(light, centre, radius)],
             LightKind::Spot { outer, .. } if outer <= CUBE_FACE_OUTER => {
-                vec![View::perspective(position, light.direction, any_up(light.direction), f64::from(outer).tan() * MARGIN, radius * NEAR)]
+                let tangent = (f64::from(outer).tan() * MARGIN).max(LEAST_TANGENT);
+                vec![View::perspective(position, light.direction, any_up(light.direction), tangent, radius * NEAR)]
             }
             _ => CUBE.map(|(forward, up)| View::perspective(position, forward, up, 1.0, radius * NEAR)).into(),
         };

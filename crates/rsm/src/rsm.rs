@@ -1,7 +1,6 @@
 //! The `rsm` pass.
 
 use crate::faces;
-use encase::StorageBuffer;
 use lobelia_frame::{ReflectiveShadowMap, ReflectiveShadowMapShape, SceneWorld, SurfaceFlags, SurfaceFormats};
 use lobelia_graph::{
     BuildError, CreateContext, DeviceOf, Frame, InputShapes, Need, NoPorts, OutputShapes, Pass, PlanContext, PortError, Ports, RasterDescription,
@@ -14,6 +13,10 @@ use serde::{Deserialize, Serialize};
 /// Draws the scene from every punctual light.
 pub struct RsmPass {
     pipeline: RasterPipeline,
+    /// The faces of the scene as it was at `version`. They are copied into the output in its place among the frame's commands: a direct write
+    /// would come before all of them, and another resource may still be using the memory then.
+    described: wgpu::Buffer,
+    version: u64,
 }
 
 /// Parameters of `rsm`.
@@ -46,10 +49,10 @@ struct Face {
     label: String,
 }
 
-/// Every face, and the buffer that describes them.
+/// Every face, and the output that describes them.
 pub struct Bindings {
     faces: Vec<Face>,
-    described: wgpu::Buffer,
+    descriptions: wgpu::Buffer,
 }
 
 /// Most layers that a texture array has at the WebGPU baseline.
@@ -113,7 +116,15 @@ impl Pass for RsmPass {
             primitive: wgpu::PrimitiveState::default(),
             layouts: &[(1, context.world.material_layout.clone())],
         })?;
-        Ok(Self { pipeline })
+        let bytes = faces::bytes(&context.world.scene);
+        let described = context.gpu.device().create_buffer(&wgpu::BufferDescriptor {
+            label: Some("described faces"),
+            size: bytes.len() as u64,
+            usage: wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        context.gpu.queue().write_buffer(&described, 0, &bytes);
+        Ok(Self { pipeline, described, version: context.world.scene.geometry_version() })
     }
 
     fn bind(&self, context: &CreateContext<'_, Self>, _: &NoPorts, outputs: &Outputs) -> Result<Bindings, BuildError> {
@@ -144,14 +155,16 @@ impl Pass for RsmPass {
                 label: format!("light {light}, face {}", layer - first),
             });
         }
-        Ok(Bindings { faces, described: out.faces.buffer().clone() })
+        Ok(Bindings { faces, descriptions: out.faces.buffer().clone() })
     }
 
     fn record(&mut self, frame: &mut Frame<'_>, world: &DeviceOf<Self>, bindings: &Bindings) -> Result<(), RunError> {
-        let mut bytes = StorageBuffer::new(Vec::<u8>::new());
-        let failed = |error: encase::internal::Error| RunError::Pass { pass: frame.pass_name().to_owned(), message: error.to_string() };
-        bytes.write(&faces::all(&world.scene)).map_err(failed)?;
-        frame.write_buffer(&bindings.described, bytes.as_ref());
+        let version = world.scene.geometry_version();
+        if version != self.version {
+            frame.write_buffer(&self.described, &faces::bytes(&world.scene));
+            self.version = version;
+        }
+        frame.encoder().copy_buffer_to_buffer(&self.described, 0, &bindings.descriptions, 0, self.described.size());
         let clear = wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: wgpu::StoreOp::Store };
         for face in &bindings.faces {
             let colors = face

@@ -80,7 +80,11 @@ impl<'a> Frame<'a> {
             label: Some(label),
             timestamp_writes: query.as_ref().and_then(|query| query.compute_writes()),
         });
+        // Groups sit inside encoder passes: a group around several would have to be closed at every split, and some software drivers lose their
+        // footing when labelled passes nest in one.
+        pass.push_debug_group(self.pass);
         let result = record(&mut pass);
+        pass.pop_debug_group();
         drop(pass);
         self.timer.end(query, self.encoder);
         result
@@ -102,7 +106,11 @@ impl<'a> Frame<'a> {
             timestamp_writes: query.as_ref().and_then(|query| query.render_writes()),
             ..Default::default()
         });
+        // Groups sit inside encoder passes: a group around several would have to be closed at every split, and some software drivers lose their
+        // footing when labelled passes nest in one.
+        pass.push_debug_group(self.pass);
         let result = record(&mut pass);
+        pass.pop_debug_group();
         drop(pass);
         self.timer.end(query, self.encoder);
         result

@@ -242,7 +242,6 @@ impl<W: World> Runner<W> {
                 flush(gpu, &mut encoder, &mut self.timer)?;
             }
             let start = begin.elapsed();
-            encoder.push_debug_group(&planned.name);
             let mut frame = Frame {
                 gpu,
                 encoder: &mut encoder,
@@ -254,7 +253,6 @@ impl<W: World> Runner<W> {
                 connected: &run.connected[side],
             };
             run.pass.record(&mut frame, world, run.bindings[side].as_ref())?;
-            encoder.pop_debug_group();
             let recorded = begin.elapsed();
             let cpu_ms = (recorded - start).as_secs_f64() * 1e3;
             let mut gpu_ms = None;

@@ -1,0 +1,102 @@
+//! Where in a RON file something is written.
+//!
+//! `ron` tells positions of what it cannot parse, not of values that parse and turn out to be wrong. This finds a key again by walking the text's
+//! tokens, so that comments and longer words that contain the key are not taken for it.
+
+use std::ops::Range;
+
+/// Line and column, from 1, of the last of `path` that is found: each step is a field name or a quoted map key that comes after the step before.
+pub(crate) fn of(text: &str, path: &[&str]) -> (usize, usize) {
+    let mut found = 0;
+    let mut steps = path.iter();
+    let mut step = steps.next();
+    for token in tokens(text) {
+        let Some(wanted) = step else { break };
+        let written = &text[token.clone()];
+        let quoted = written.strip_prefix('"').and_then(|rest| rest.strip_suffix('"'));
+        if quoted.unwrap_or(written) == *wanted {
+            found = token.start;
+            step = steps.next();
+        }
+    }
+    let before = &text[..found];
+    let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+    (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
+}
+
+/// Words and quoted strings, in order; no comments.
+fn tokens(text: &str) -> impl Iterator<Item = Range<usize>> + '_ {
+    let bytes = text.as_bytes();
+    let is_word = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'_';
+    let mut at = 0;
+    std::iter::from_fn(move || {
+        while at < bytes.len() {
+            let start = at;
+            match (bytes[at], bytes.get(at + 1)) {
+                (b'/', Some(b'/')) => at = text[at..].find('\n').map_or(bytes.len(), |length| at + length),
+                (b'/', Some(b'*')) => at = block_comment_end(bytes, at),
+                (b'"', _) => {
+                    at += 1;
+                    while at < bytes.len() && bytes[at] != b'"' {
+                        at += if bytes[at] == b'\\' { 2 } else { 1 };
+                    }
+                    at = (at + 1).min(bytes.len());
+                    return Some(start..at);
+                }
+                (byte, _) if is_word(byte) => {
+                    while at < bytes.len() && is_word(bytes[at]) {
+                        at += 1;
+                    }
+                    return Some(start..at);
+                }
+                _ => at += 1,
+            }
+        }
+        None
+    })
+}
+
+/// RON's block comments nest.
+fn block_comment_end(bytes: &[u8], start: usize) -> usize {
+    let (mut at, mut depth) = (start, 0usize);
+    while at + 1 < bytes.len() {
+        match &bytes[at..at + 2] {
+            b"/*" => (at, depth) = (at + 2, depth + 1),
+            b"*/" => (at, depth) = (at + 2, depth - 1),
+            _ => at += 1,
+        }
+        if depth == 0 {
+            return at;
+        }
+    }
+    bytes.len()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::of;
+
+    const TEXT: &str = "(\n  // materials: a comment\n  gltf: \"materials\", /* lights /* nested */ lights */\n  materials_more: 1,\n  materials: {\n    \"Göld\": (roughness: 1), \"b\": (roughness: 2),\n  },\n)";
+
+    #[test]
+    fn comments_and_longer_words_are_not_the_key() {
+        assert_eq!(of("( // b: 1\n/* b: /* b */ b */ bb: 1,\n b: 2)", &["b"]), (3, 2));
+    }
+
+    #[test]
+    fn a_path_is_followed_step_by_step() {
+        assert_eq!(of(TEXT, &["materials_more"]), (4, 3));
+        assert_eq!(of(TEXT, &["materials_more", "materials", "b"]), (6, 29));
+        assert_eq!(of(TEXT, &["materials_more", "materials", "b", "roughness"]), (6, 35));
+        assert_eq!(of(TEXT, &["materials_more", "materials", "Göld", "roughness"]), (6, 14));
+    }
+
+    #[test]
+    fn what_is_not_found_is_told_as_the_step_before_it() {
+        assert_eq!(of("(\n a: {}, )", &["a", "b"]), (2, 2));
+        assert_eq!(of("()", &["a"]), (1, 1));
+        assert_eq!(of("(\"unfinished \\", &["a"]), (1, 1));
+        assert_eq!(of("/* unfinished", &["a"]), (1, 1));
+        assert_eq!(of("", &["a"]), (1, 1));
+    }
+}
