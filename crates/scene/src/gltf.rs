@@ -12,6 +12,7 @@ mod tree;
 
 use crate::{
     AlphaMode, AreaLight, Camera, Instance, LightKind, Material, Mesh, PunctualLight, Sampler, Scene, SceneError, TextureRef, Wrap,
+    files,
 };
 use accessor::Buffers;
 use base64::Engine;
@@ -31,7 +32,7 @@ const MAX_AREA_LIGHTS: usize = 4096;
 /// Loads a `.glb` or `.gltf` file.
 pub(crate) fn load(path: &Path) -> Result<Scene, SceneError> {
     let shown = path.display().to_string();
-    let bytes = read_file(path).map_err(|reason| SceneError::Unreadable { file: shown.clone(), reason })?;
+    let bytes = files::read(path).map_err(|reason| SceneError::Unreadable { file: shown.clone(), reason })?;
     parse(&bytes, &shown, path.parent())
 }
 
@@ -57,9 +58,6 @@ pub(crate) fn parse(bytes: &[u8], shown: &str, folder: Option<&Path>) -> Result<
     Ok(scene)
 }
 
-/// Most bytes of one external file.
-const MAX_FILE: u64 = 1 << 30;
-
 /// Bytes behind a URI: `data:` or a file beside the glTF file.
 fn read_uri(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>, String> {
     if let Some(data) = uri.strip_prefix("data:") {
@@ -67,19 +65,7 @@ fn read_uri(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>, String> {
         return base64::engine::general_purpose::STANDARD.decode(encoded).map_err(|error| format!("a data URI with broken base64: {error}"));
     }
     let path = folder.unwrap_or(Path::new(".")).join(percent_decoded(uri));
-    read_file(&path).map_err(|reason| format!("{}: cannot be read: {reason}", path.display()))
-}
-
-/// A whole regular file: devices and pipes may have no end.
-fn read_file(path: &Path) -> Result<Vec<u8>, String> {
-    let about = std::fs::metadata(path).map_err(|error| error.to_string())?;
-    if !about.is_file() {
-        return Err("it is not a file".into());
-    }
-    if about.len() > MAX_FILE {
-        return Err(format!("it has {} bytes; at most {MAX_FILE} are read", about.len()));
-    }
-    std::fs::read(path).map_err(|error| error.to_string())
+    files::read(&path).map_err(|reason| format!("{}: cannot be read: {reason}", path.display()))
 }
 
 fn percent_decoded(uri: &str) -> String {

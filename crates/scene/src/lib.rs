@@ -9,6 +9,7 @@ mod builtin;
 mod camera;
 pub mod device;
 mod error;
+mod files;
 mod gltf;
 mod light;
 mod material;
@@ -171,6 +172,13 @@ impl Scene {
             }
         }
         moved
+    }
+
+    /// Takes all lights away, area lights with their surfaces. Emissive materials and the environment stay.
+    pub(crate) fn drop_lights(&mut self) {
+        self.lights.clear();
+        self.area_lights.clear();
+        self.instances.retain(|instance| instance.area_light.is_none());
     }
 
     /// A camera by name, or the first one. A scene without cameras gets one that sees everything, named `whole-scene`.

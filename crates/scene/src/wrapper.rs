@@ -1,13 +1,12 @@
 //! RON scenes: a glTF file (or a built-in scene) with camera, lights, environment and materials added or overridden.
 
-use crate::{
-    Camera, Environment, LightKind, Ndf, PunctualLight, Scene, SceneError,
-    error::suggestion,
-    gltf::check_light,
-};
+mod position;
+
+use crate::{Camera, Environment, LightKind, Ndf, PunctualLight, Scene, SceneError, error::suggestion, files, gltf::check_light};
 use glam::{DVec3, Vec3};
+use position::Step::{self, Field, Quoted};
 use serde::{Deserialize, Deserializer, de::MapAccess};
-use std::{fmt, marker::PhantomData, path::Path};
+use std::{fmt, io::Cursor, marker::PhantomData, path::Path};
 
 /// A map that keeps the order of the file.
 #[derive(Debug)]
@@ -83,8 +82,7 @@ struct WrittenCamera {
     up: (f64, f64, f64),
     #[serde(default = "usual_yfov")]
     yfov: f64,
-    #[serde(default = "usual_near")]
-    near: f64,
+    near: Option<f64>,
 }
 
 fn upwards() -> (f64, f64, f64) {
@@ -93,10 +91,6 @@ fn upwards() -> (f64, f64, f64) {
 
 fn usual_yfov() -> f64 {
     0.7
-}
-
-fn usual_near() -> f64 {
-    0.01
 }
 
 #[derive(Debug, Deserialize)]
@@ -125,25 +119,47 @@ struct File<'a> {
 }
 
 impl File<'_> {
-    fn at(&self, line: usize, column: usize, message: impl Into<String>, help: Option<String>) -> SceneError {
+    /// An error about what stands at `path`.
+    fn about(&self, path: &[Step<'_>], message: impl Into<String>, help: Option<String>) -> SceneError {
+        let (line, column) = position::of(self.text, path);
         SceneError::Ron { file: self.path.clone(), line, column, message: message.into(), help }
     }
+}
 
-    /// An error about a quoted name, or about the section it stands in.
-    fn about(&self, section: &str, name: &str, message: impl Into<String>, help: Option<String>) -> SceneError {
-        let section_start = self.text.find(section).unwrap_or(0);
-        let quoted = format!("\"{name}\"");
-        let offset = self.text[section_start..].find(&quoted).map_or(section_start, |found| section_start + found);
-        let before = &self.text[..offset];
-        let column = before.rsplit('\n').next().unwrap_or("").chars().count() + 1;
-        self.at(before.matches('\n').count() + 1, column, message, help)
+/// An entry of one of the file's maps, to say where one of its fields stands.
+struct Entry<'a> {
+    file: &'a File<'a>,
+    section: &'a str,
+    kind: &'a str,
+    name: &'a str,
+}
+
+impl Entry<'_> {
+    fn fail(&self, field: &str, message: impl fmt::Display) -> SceneError {
+        let Entry { file, section, kind, name } = self;
+        file.about(&[Field(section), Quoted(name), Field(field)], format!("{kind} `{name}`: {message}"), None)
+    }
+
+    fn point(&self, field: &str, (x, y, z): (f64, f64, f64)) -> Result<DVec3, SceneError> {
+        let point = DVec3::new(x, y, z);
+        if point.is_finite() { Ok(point) } else { Err(self.fail(field, format_args!("{field} is {point}, but must be finite"))) }
+    }
+
+    fn direction(&self, field: &str, written: (f64, f64, f64)) -> Result<DVec3, SceneError> {
+        let direction = self.point(field, written)?;
+        direction.try_normalize().ok_or_else(|| self.fail(field, format_args!("{field} is zero, and so points nowhere")))
+    }
+
+    fn unit(&self, field: &str, value: f32) -> Result<f32, SceneError> {
+        if (0.0..=1.0).contains(&value) { Ok(value) } else { Err(self.fail(field, format_args!("{field} is {value}, but must lie in [0, 1]"))) }
     }
 }
 
 /// Loads a RON scene.
 pub(crate) fn load(path: &Path) -> Result<Scene, SceneError> {
     let shown = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(|error| SceneError::Unreadable { file: shown.clone(), reason: error.to_string() })?;
+    let unreadable = |reason: String| SceneError::Unreadable { file: shown.clone(), reason };
+    let text = files::read(path).and_then(|bytes| String::from_utf8(bytes).map_err(|error| error.to_string())).map_err(unreadable)?;
     parse(&text, &shown, path.parent().unwrap_or(Path::new(".")))
 }
 
@@ -151,14 +167,17 @@ pub(crate) fn parse(text: &str, shown: &str, folder: &Path) -> Result<Scene, Sce
     let file = File { path: shown.to_owned(), text };
     let options = ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
     let written: Written = options.from_str(text).map_err(|error| {
-        let help = unknown_field_help(&error.code);
-        file.at(error.span.start.line, error.span.start.col, error.code.to_string(), help)
+        let (line, column) = (error.span.start.line, error.span.start.col);
+        SceneError::Ron { file: shown.to_owned(), line, column, message: error.code.to_string(), help: unknown_field_help(&error.code) }
     })?;
     let base = if written.gltf.starts_with("builtin:") { written.gltf.clone() } else { folder.join(&written.gltf).display().to_string() };
     if base.to_lowercase().ends_with(".ron") {
-        return Err(file.about("gltf", &written.gltf, "a RON scene wraps a glTF file or a built-in scene, not another RON scene", None));
+        return Err(file.about(&[Field("gltf")], "a RON scene wraps a glTF file or a built-in scene, not another RON scene", None));
     }
     let mut scene = Scene::load(&base)?;
+    if !written.keep_lights {
+        scene.drop_lights();
+    }
     if let Some(ndf) = written.ndf {
         scene.ndf = ndf;
     }
@@ -166,7 +185,7 @@ pub(crate) fn parse(text: &str, shown: &str, folder: &Path) -> Result<Scene, Sce
         scene.environment = Some(load_environment(&file, environment, folder)?);
     }
     add_cameras(&file, &mut scene, &written.cameras)?;
-    add_lights(&file, &mut scene, &written)?;
+    add_lights(&file, &mut scene, &written.lights)?;
     change_materials(&file, &mut scene, &written.materials)?;
     Ok(scene)
 }
@@ -179,50 +198,58 @@ fn unknown_field_help(error: &ron::Error) -> Option<String> {
     }
 }
 
-fn dvec3((x, y, z): (f64, f64, f64)) -> DVec3 {
-    DVec3::new(x, y, z)
-}
-
 fn vec3((x, y, z): (f32, f32, f32)) -> Vec3 {
     Vec3::new(x, y, z)
 }
 
+/// Largest side of an environment map: the largest texture that every WebGPU device takes.
+const MAX_SIDE: u32 = 8192;
+
 fn load_environment(file: &File<'_>, written: &WrittenEnvironment, folder: &Path) -> Result<Environment, SceneError> {
-    let fail = |message: String| file.about("environment", &written.file, message, None);
+    let fail = |field: &str, message: String| file.about(&[Field("environment"), Field(field)], format!("environment: {message}"), None);
     if !(written.scale.is_finite() && written.scale >= 0.0) {
-        return Err(fail(format!("environment: scale is {}, but must be finite and not negative", written.scale)));
+        return Err(fail("scale", format!("scale is {}, but must be finite and not negative", written.scale)));
     }
     let path = folder.join(&written.file);
     let name = path.display().to_string();
-    let mut reader = image::ImageReader::open(&path)
-        .and_then(image::ImageReader::with_guessed_format)
-        .map_err(|error| fail(format!("environment {name}: cannot be read: {error}")))?;
-    let mut limits = image::Limits::default();
-    (limits.max_image_width, limits.max_image_height, limits.max_alloc) = (Some(8192), Some(8192), Some(1 << 30));
-    reader.limits(limits);
-    let decoded = reader.decode().map_err(|error| fail(format!("environment {name}: cannot be decoded: {error}")))?.to_rgb32f();
-    let (width, height) = decoded.dimensions();
-    let pixels: Vec<Vec3> = decoded.pixels().map(|pixel| Vec3::from_array(pixel.0)).collect();
+    let bytes = files::read(&path).map_err(|reason| fail("file", format!("{name}: cannot be read: {reason}")))?;
+    let pixels = decode(&bytes).map_err(|reason| fail("file", format!("{name}: {reason}")))?;
+    let (width, height) = pixels.dimensions();
+    let pixels: Vec<Vec3> = pixels.pixels().map(|pixel| Vec3::from_array(pixel.0)).collect();
     if let Some(place) = pixels.iter().position(|pixel| !pixel.is_finite() || pixel.min_element() < 0.0) {
         let (x, y) = (place as u32 % width, place as u32 / width);
-        return Err(fail(format!("environment {name}: pixel ({x}, {y}) is {}, but radiance must be finite and not negative", pixels[place])));
+        return Err(fail("file", format!("{name}: pixel ({x}, {y}) is {}, but radiance must be finite and not negative", pixels[place])));
     }
     Ok(Environment { name, width, height, pixels, scale: written.scale })
+}
+
+fn decode(bytes: &[u8]) -> Result<image::Rgb32FImage, String> {
+    let mut reader = image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|error| format!("cannot be read: {error}"))?;
+    let mut limits = image::Limits::default();
+    (limits.max_image_width, limits.max_image_height, limits.max_alloc) = (Some(MAX_SIDE), Some(MAX_SIDE), Some(1 << 30));
+    reader.limits(limits);
+    let pixels = reader.decode().map_err(|error| format!("cannot be decoded: {error}"))?.to_rgb32f();
+    if pixels.width() == 0 || pixels.height() == 0 {
+        return Err("it has no pixels".into());
+    }
+    Ok(pixels)
 }
 
 fn add_cameras(file: &File<'_>, scene: &mut Scene, cameras: &Ordered<WrittenCamera>) -> Result<(), SceneError> {
     let mut added = Vec::new();
     for (name, written) in &cameras.0 {
-        let fail = |message: String| file.about("cameras", name, format!("camera `{name}`: {message}"), None);
-        if !(written.yfov > 0.0 && written.yfov < std::f64::consts::PI) {
-            return Err(fail(format!("yfov is {}, but must lie in (0, pi) radians", written.yfov)));
+        let entry = Entry { file, section: "cameras", kind: "camera", name };
+        if !(written.yfov > 1e-4 && written.yfov < std::f64::consts::PI - 1e-4) {
+            return Err(entry.fail("yfov", format_args!("yfov is {}, but must lie in (0, pi) radians", written.yfov)));
         }
-        if !(written.near > 0.0 && written.near.is_finite()) {
-            return Err(fail(format!("near is {}, but must be positive", written.near)));
+        let near = written.near.unwrap_or_else(|| scene.usual_near());
+        if !(near > 0.0 && near.is_finite()) {
+            return Err(entry.fail("near", format_args!("near is {near}, but must be positive and finite")));
         }
-        let (origin, target, up) = (dvec3(written.origin), dvec3(written.target), dvec3(written.up));
-        let camera = Camera::look_at(name, origin, target, up, written.yfov, written.near).filter(|camera| camera.position.is_finite());
-        added.push(camera.ok_or_else(|| fail("origin and target must differ and up not lie along the view".into()))?);
+        let (origin, target) = (entry.point("origin", written.origin)?, entry.point("target", written.target)?);
+        let up = entry.direction("up", written.up)?;
+        let camera = Camera::look_at(name, origin, target, up, written.yfov, near);
+        added.push(camera.ok_or_else(|| entry.fail("target", "target must differ from origin and not lie along up"))?);
     }
     // A camera of the wrapper comes first, and replaces one of the same name.
     scene.cameras.retain(|camera| !added.iter().any(|new| new.name == camera.name));
@@ -231,24 +258,21 @@ fn add_cameras(file: &File<'_>, scene: &mut Scene, cameras: &Ordered<WrittenCame
     Ok(())
 }
 
-fn add_lights(file: &File<'_>, scene: &mut Scene, written: &Written) -> Result<(), SceneError> {
-    if !written.keep_lights {
-        scene.lights.clear();
-    }
-    for (name, light) in &written.lights.0 {
-        let fail = |message: String| file.about("lights", name, format!("light `{name}`: {message}"), None);
+fn add_lights(file: &File<'_>, scene: &mut Scene, lights: &Ordered<WrittenLight>) -> Result<(), SceneError> {
+    for (name, light) in &lights.0 {
+        let entry = Entry { file, section: "lights", kind: "light", name };
         let (kind, position, direction, intensity) = match *light {
-            WrittenLight::Point { position, intensity } => (LightKind::Point, dvec3(position), DVec3::NEG_Y, vec3(intensity)),
+            WrittenLight::Point { position, intensity } => (LightKind::Point, entry.point("position", position)?, DVec3::NEG_Z, intensity),
             WrittenLight::Spot { position, direction, intensity, inner, outer } => {
-                (LightKind::Spot { inner, outer }, dvec3(position), dvec3(direction), vec3(intensity))
+                let kind = LightKind::Spot { inner, outer };
+                (kind, entry.point("position", position)?, entry.direction("direction", direction)?, intensity)
             }
-            WrittenLight::Directional { direction, illuminance } => (LightKind::Directional, DVec3::ZERO, dvec3(direction), vec3(illuminance)),
+            WrittenLight::Directional { direction, illuminance } => {
+                (LightKind::Directional, DVec3::ZERO, entry.direction("direction", direction)?, illuminance)
+            }
         };
-        check_light(kind, intensity).map_err(fail)?;
-        let direction = direction.try_normalize().ok_or_else(|| fail("its direction is zero".into()))?;
-        if !position.is_finite() {
-            return Err(fail(format!("its position is {position}, but must be finite")));
-        }
+        let intensity = vec3(intensity);
+        check_light(kind, intensity).map_err(|message| entry.fail("", message))?;
         scene.lights.retain(|known| known.name != *name);
         scene.lights.push(PunctualLight { name: name.clone(), kind, position, direction, intensity, animated: false, node: None });
     }
@@ -256,39 +280,38 @@ fn add_lights(file: &File<'_>, scene: &mut Scene, written: &Written) -> Result<(
 }
 
 fn change_materials(file: &File<'_>, scene: &mut Scene, changes: &Ordered<WrittenMaterial>) -> Result<(), SceneError> {
+    // The surfaces of area lights stay what they are.
+    let light_surfaces: Vec<usize> =
+        scene.instances.iter().filter(|instance| instance.area_light.is_some()).map(|instance| scene.meshes[instance.mesh].material).collect();
     for (name, change) in &changes.0 {
-        let known: Vec<&str> = scene.materials.iter().map(|material| material.name.as_str()).collect();
-        if name != "*" && !known.contains(&name.as_str()) {
-            return Err(file.about("materials", name, format!("no material is called `{name}`"), Some(suggestion(name, &known))));
+        let surfaces = scene.materials.iter_mut().enumerate().filter(|(index, _)| !light_surfaces.contains(index));
+        let mut materials: Vec<_> = surfaces.map(|(_, material)| material).collect();
+        if name != "*" && !materials.iter().any(|material| material.name == *name) {
+            let known: Vec<&str> = materials.iter().map(|material| material.name.as_str()).collect();
+            let help = Some(suggestion(name, &known));
+            return Err(file.about(&[Field("materials"), Quoted(name)], format!("no material is called `{name}`"), help));
         }
-        let fail = |message: String| file.about("materials", name, format!("material `{name}`: {message}"), None);
-        let unit = |what: &str, value: Option<f32>| match value {
-            Some(value) if !(0.0..=1.0).contains(&value) => Err(fail(format!("{what} is {value}, but must lie in [0, 1]"))),
-            value => Ok(value),
-        };
-        let (metallic, roughness) = (unit("metallic", change.metallic)?, unit("roughness", change.roughness)?);
+        let entry = Entry { file, section: "materials", kind: "material", name };
+        let unit = |field: &str, value: Option<f32>| value.map(|value| entry.unit(field, value)).transpose();
+        let metallic = unit("metallic", change.metallic)?;
+        let roughness = unit("roughness", change.roughness)?;
         let specular = unit("specular", change.specular)?;
         let base_color = change.base_color.map(vec3);
         for channel in base_color.iter().flat_map(|color| color.to_array()) {
-            unit("base_color", Some(channel))?;
+            entry.unit("base_color", channel)?;
         }
         let emissive = change.emissive.map(vec3);
-        if emissive.is_some_and(|color| !color.is_finite() || color.min_element() < 0.0) {
-            return Err(fail("emissive must be finite and not negative".into()));
+        if let Some(emissive) = emissive.filter(|color| !color.is_finite() || color.min_element() < 0.0) {
+            return Err(entry.fail("emissive", format_args!("emissive is {emissive}, but must be finite and not negative")));
         }
-        let light_surfaces: Vec<usize> =
-            scene.instances.iter().filter(|instance| instance.area_light.is_some()).map(|instance| scene.meshes[instance.mesh].material).collect();
-        for (index, material) in scene.materials.iter_mut().enumerate() {
-            // `*` means the scene's surfaces; those of area lights stay what they are.
-            if (name == "*" && !light_surfaces.contains(&index)) || *name == material.name {
-                material.metallic = metallic.unwrap_or(material.metallic);
-                material.roughness = roughness.unwrap_or(material.roughness);
-                material.specular = specular.unwrap_or(material.specular);
-                material.base_color = base_color.unwrap_or(material.base_color);
-                material.emissive = emissive.unwrap_or(material.emissive);
-                if change.normal_map == Some(false) {
-                    material.normal_texture = None;
-                }
+        for material in materials.iter_mut().filter(|material| name == "*" || material.name == *name) {
+            material.metallic = metallic.unwrap_or(material.metallic);
+            material.roughness = roughness.unwrap_or(material.roughness);
+            material.specular = specular.unwrap_or(material.specular);
+            material.base_color = base_color.unwrap_or(material.base_color);
+            material.emissive = emissive.unwrap_or(material.emissive);
+            if change.normal_map == Some(false) {
+                material.normal_texture = None;
             }
         }
     }

@@ -39,7 +39,7 @@ pub(crate) fn read(
     let normals = numbers(&Semantic::Normals, 3)?;
     if let Some(normals) = &normals {
         same_length("NORMAL", normals.len() / 3)?;
-        mesh.normals = normals.chunks_exact(3).map(|normal| Vec3::from_slice(normal).normalize_or_zero()).collect();
+        mesh.normals = normals.chunks_exact(3).map(|normal| Vec3::from_slice(normal).as_dvec3().normalize_or_zero().as_vec3()).collect();
     }
     if let Some(uvs) = numbers(&Semantic::TexCoords(0), 2)? {
         same_length("TEXCOORD_0", uvs.len() / 2)?;
@@ -52,7 +52,7 @@ pub(crate) fn read(
     let tangents = if needs_tangents && normals.is_some() { numbers(&Semantic::Tangents, 4)? } else { None };
     if let Some(tangents) = &tangents {
         same_length("TANGENT", tangents.len() / 4)?;
-        mesh.tangents = tangents.chunks_exact(4).map(Vec4::from_slice).collect();
+        mesh.tangents = tangents.chunks_exact(4).map(unit_tangent).collect();
     }
     let indices = match primitive.indices() {
         Some(accessor) => buffers.indices(shown, &accessor)?,
@@ -79,6 +79,15 @@ pub(crate) fn read(
     }
     mesh.fill();
     Ok((Some(mesh), warnings))
+}
+
+/// Unit, with a handedness of 1 or -1; all 0, which stands for none, where it has no direction.
+fn unit_tangent(numbers: &[f32]) -> Vec4 {
+    let tangent = Vec4::from_slice(numbers);
+    match tangent.truncate().as_dvec3().try_normalize() {
+        Some(axis) => axis.as_vec3().extend(1f32.copysign(tangent.w)),
+        None => Vec4::ZERO,
+    }
 }
 
 /// Strips and fans to triangles.

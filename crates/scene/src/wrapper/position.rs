@@ -5,16 +5,28 @@
 
 use std::ops::Range;
 
-/// Line and column, from 1, of the last of `path` that is found: each step is a field name or a quoted map key that comes after the step before.
-pub(crate) fn of(text: &str, path: &[&str]) -> (usize, usize) {
+/// One step on the way to a place.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Step<'a> {
+    /// A field: a word with a colon after it.
+    Field(&'a str),
+    /// A quoted string.
+    Quoted(&'a str),
+}
+
+/// Line and column, from 1, of the last step of `path` that is found, each after the step before it.
+pub(crate) fn of(text: &str, path: &[Step<'_>]) -> (usize, usize) {
     let mut found = 0;
     let mut steps = path.iter();
     let mut step = steps.next();
     for token in tokens(text) {
-        let Some(wanted) = step else { break };
         let written = &text[token.clone()];
-        let quoted = written.strip_prefix('"').and_then(|rest| rest.strip_suffix('"'));
-        if quoted.unwrap_or(written) == *wanted {
+        let fits = match step {
+            None => break,
+            Some(Step::Field(field)) => written == *field && text[token.end..].trim_start().starts_with(':'),
+            Some(Step::Quoted(name)) => written.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')) == Some(name),
+        };
+        if fits {
             found = token.start;
             step = steps.next();
         }
@@ -74,29 +86,31 @@ fn block_comment_end(bytes: &[u8], start: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::of;
+    use super::{Step::*, of};
 
-    const TEXT: &str = "(\n  // materials: a comment\n  gltf: \"materials\", /* lights /* nested */ lights */\n  materials_more: 1,\n  materials: {\n    \"Göld\": (roughness: 1), \"b\": (roughness: 2),\n  },\n)";
+    const TEXT: &str = "(\n  // materials: a comment\n  gltf: \"materials\", /* lights /* nested */ lights */\n  materials_more: 1,\n  materials : {\n    \"Göld\": (roughness: 1), \"b\": (roughness: 2),\n  },\n)";
 
     #[test]
-    fn comments_and_longer_words_are_not_the_key() {
-        assert_eq!(of("( // b: 1\n/* b: /* b */ b */ bb: 1,\n b: 2)", &["b"]), (3, 2));
+    fn comments_strings_and_longer_words_are_not_the_key() {
+        assert_eq!(of("( // b: 1\n/* b: /* b */ b: */ bb: 1, c: b,\n b: 2)", &[Field("b")]), (3, 2));
+        assert_eq!(of(TEXT, &[Field("materials")]), (5, 3));
     }
 
     #[test]
     fn a_path_is_followed_step_by_step() {
-        assert_eq!(of(TEXT, &["materials_more"]), (4, 3));
-        assert_eq!(of(TEXT, &["materials_more", "materials", "b"]), (6, 29));
-        assert_eq!(of(TEXT, &["materials_more", "materials", "b", "roughness"]), (6, 35));
-        assert_eq!(of(TEXT, &["materials_more", "materials", "Göld", "roughness"]), (6, 14));
+        assert_eq!(of(TEXT, &[Field("materials_more")]), (4, 3));
+        assert_eq!(of(TEXT, &[Field("gltf"), Quoted("materials")]), (3, 9));
+        assert_eq!(of(TEXT, &[Field("materials"), Quoted("b")]), (6, 29));
+        assert_eq!(of(TEXT, &[Field("materials"), Quoted("b"), Field("roughness")]), (6, 35));
+        assert_eq!(of(TEXT, &[Field("materials"), Quoted("Göld"), Field("roughness")]), (6, 14));
     }
 
     #[test]
     fn what_is_not_found_is_told_as_the_step_before_it() {
-        assert_eq!(of("(\n a: {}, )", &["a", "b"]), (2, 2));
-        assert_eq!(of("()", &["a"]), (1, 1));
-        assert_eq!(of("(\"unfinished \\", &["a"]), (1, 1));
-        assert_eq!(of("/* unfinished", &["a"]), (1, 1));
-        assert_eq!(of("", &["a"]), (1, 1));
+        assert_eq!(of("(\n a: {}, )", &[Field("a"), Quoted("b")]), (2, 2));
+        assert_eq!(of("()", &[Field("a")]), (1, 1));
+        assert_eq!(of("(\"unfinished \\", &[Quoted("a")]), (1, 1));
+        assert_eq!(of("/* unfinished", &[Field("a")]), (1, 1));
+        assert_eq!(of("", &[Field("a")]), (1, 1));
     }
 }
