@@ -30,7 +30,7 @@ pub struct Params {
 
 impl Default for Params {
     fn default() -> Self {
-        Self { resolution: 1024 }
+        Self { resolution: 512 }
     }
 }
 
