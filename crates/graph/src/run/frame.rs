@@ -40,6 +40,8 @@ pub struct Frame<'a> {
     pub(crate) history_valid: bool,
     pub(crate) progress: &'a mut Progress<'a>,
     pub(crate) connected: &'a Connected,
+    /// Seconds that this pass waited for its own submissions.
+    pub(crate) waited: f64,
 }
 
 impl<'a> Frame<'a> {
@@ -119,8 +121,10 @@ impl<'a> Frame<'a> {
     /// Submits what has been recorded so far and reports progress, so that long work reaches the device in pieces. Waits for the work, so that
     /// at most one piece is under way.
     pub fn split(&mut self, done: f32) -> Result<(), RunError> {
+        let clock = Instant::now();
         self.submit();
         self.gpu.wait()?;
+        self.waited += clock.elapsed().as_secs_f64();
         if (self.progress)(self.pass, done.clamp(0.0, 1.0)) { Ok(()) } else { Err(RunError::Stopped) }
     }
 

@@ -251,11 +251,14 @@ impl<W: World> Runner<W> {
                 history_valid: self.age > 0,
                 progress: &mut *progress,
                 connected: &run.connected[side],
+                waited: 0.0,
             };
             run.pass.record(&mut frame, world, run.bindings[side].as_ref())?;
+            let waited_ms = frame.waited * 1e3;
             let recorded = begin.elapsed();
-            let cpu_ms = (recorded - start).as_secs_f64() * 1e3;
-            let mut gpu_ms = None;
+            let cpu_ms = ((recorded - start).as_secs_f64() * 1e3 - waited_ms).max(0.0);
+            // Work that was split was waited for, so the wall clock knows how long it took.
+            let mut gpu_ms = (waited_ms > 0.0).then_some(waited_ms);
             if isolated {
                 flush(gpu, &mut encoder, &mut self.timer)?;
                 gpu_ms = Some((begin.elapsed() - start).as_secs_f64() * 1e3);
@@ -300,7 +303,7 @@ impl<W: World> Runner<W> {
                 for pass in &mut report.passes {
                     let spans = times.spans.iter().filter(|span| span.pass == pass.pass);
                     let total: f64 = spans.clone().map(|span| span.end_ms - span.start_ms).sum();
-                    pass.gpu_ms = spans.count().ne(&0).then_some(total).or(pass.gpu_ms);
+                    pass.gpu_ms = pass.gpu_ms.or(spans.count().ne(&0).then_some(total));
                 }
             }
         }
@@ -406,6 +409,7 @@ impl<W: World> Runner<W> {
             history_valid: self.age > 1,
             progress: &mut |_, _| true,
             connected: &run.connected[side],
+            waited: 0.0,
         };
         run.pass.record(&mut frame, world, run.bindings[side].as_ref())?;
         gpu.queue().submit([encoder.finish()]);

@@ -100,7 +100,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     drop(plan);
 
     let gpu = lobelia::graph::Gpu::new(&lobelia::graph::GpuOptions { adapter: arguments.adapter.clone(), baseline: arguments.baseline })?;
-    let timing = match (arguments.quiet && !arguments.json && arguments.profile.is_none(), gpu.has_timestamps()) {
+    // Software devices run work when they please and stamp it when they notice; the wall clock is right there.
+    let software = gpu.info().is_some_and(|info| info.device_type == wgpu::DeviceType::Cpu);
+    let timing = match (arguments.quiet && !arguments.json && arguments.profile.is_none(), gpu.has_timestamps() && !software) {
         (true, _) => Timing::Off,
         (false, true) => Timing::Timestamps,
         (false, false) => Timing::Isolated,
