@@ -6,7 +6,7 @@
 //!
 //! Positions are not stored: `lobelia::scene::scene_position` rebuilds them from reverse-Z depth (Reed 2015, *Depth Precision Visualized*) with a
 //! relative error of 2^-23 of the distance to the camera. Because the device works in scene space (world minus a whole-metre origin), that
-//! figure holds at any distance from the world's origin; the tests measure it at 0 and at 10 km.
+//! figure holds at any distance from the world's origin: a square seen from 2.5 m is rebuilt to 1.8e-7 m at the origin and to 1.9e-7 m at 14 km.
 //!
 //! [`emission`](EmissionPass) turns emission and environment into radiance, so that light sources are seen.
 
