@@ -12,7 +12,7 @@ struct Preset {
 
 const GRAPH: &str = "graphs/indirect.ron";
 const SCENE: Preset = Preset { long: "--scene", short: None, value: "builtin:cornell-glossy" };
-const SIZE: Preset = Preset { long: "--size", short: None, value: "960x540" };
+const SIZE: Preset = Preset { long: "--size", short: None, value: "480x480" };
 const OUTPUT: Preset = Preset { long: "--output", short: Some('o'), value: "out.png" };
 
 /// Short options of `lobelia render` without a value, which may stand before another in one argument: `-qo out.png`.
@@ -71,7 +71,7 @@ mod tests {
 
     #[test]
     fn without_further_arguments_every_default_is_given() {
-        let expected = words("graphs/indirect.ron --scene builtin:cornell-glossy --size 960x540 -o out.png");
+        let expected = words("graphs/indirect.ron --scene builtin:cornell-glossy --size 480x480 -o out.png");
         assert_eq!(arguments(&[]), expected);
         assert_eq!(output(&[]), Some(PathBuf::from("out.png")));
     }
@@ -80,7 +80,7 @@ mod tests {
     fn every_spelling_of_an_option_replaces_its_default() {
         for given in ["-o a.png", "-oa.png", "-o=a.png", "-qo a.png", "--output a.png", "--output=a.png", "--seed 3 -o a.png"] {
             let extra = words(given);
-            let expected = [words("graphs/indirect.ron --scene builtin:cornell-glossy --size 960x540"), extra.clone()].concat();
+            let expected = [words("graphs/indirect.ron --scene builtin:cornell-glossy --size 480x480"), extra.clone()].concat();
             assert_eq!(arguments(&extra), expected, "{given}");
             assert_eq!(output(&extra), Some(PathBuf::from("a.png")), "{given}");
         }
@@ -91,7 +91,7 @@ mod tests {
     #[test]
     fn options_that_only_begin_alike_replace_nothing() {
         let extra = words("--outputs x --sizes 3 -q");
-        let expected = "graphs/indirect.ron --scene builtin:cornell-glossy --size 960x540 -o out.png --outputs x --sizes 3 -q";
+        let expected = "graphs/indirect.ron --scene builtin:cornell-glossy --size 480x480 -o out.png --outputs x --sizes 3 -q";
         assert_eq!(arguments(&extra), words(expected));
     }
 

@@ -19,9 +19,9 @@ pub struct TonemapPass {
 #[serde(rename_all = "snake_case")]
 pub enum Curve {
     /// The film-like curve of the Academy Color Encoding System, fitted by Stephen Hill.
-    #[default]
     Aces,
     /// AgX by Troy Sobotka: keeps hue in highlights, fit by Benjamin Wrensch.
+    #[default]
     Agx,
     /// None: what exceeds 1 is cut off.
     None,
@@ -46,7 +46,7 @@ pub struct TonemapParams {
 
 impl Default for TonemapParams {
     fn default() -> Self {
-        Self { curve: Curve::Aces, exposure: 1.0 }
+        Self { curve: Curve::Agx, exposure: 0.0 }
     }
 }
 

@@ -229,7 +229,7 @@ impl<W: World> Runner<W> {
         let info = FrameInfo { index: self.frame, seed };
         let mut encoder = gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("lobelia frame") });
         if self.age == 0 && self.sides == 2 {
-            self.clear_histories(&mut encoder);
+            self.clear_histories(gpu, &mut encoder);
         }
         let begin = Instant::now();
         let mut report = FrameReport::default();
@@ -311,11 +311,12 @@ impl<W: World> Runner<W> {
         Ok(())
     }
 
-    fn clear_histories(&self, encoder: &mut wgpu::CommandEncoder) {
+    /// Both sides of every history become zero.
+    fn clear_histories(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder) {
         for resource in self.plan.resources.iter().filter(|resource| resource.history) {
             for slot in &resource.slots {
                 match &self.slots[*slot] {
-                    SlotHandle::Texture(texture) => encoder.clear_texture(texture, &wgpu::ImageSubresourceRange::default()),
+                    SlotHandle::Texture(texture) => clear_texture(gpu, encoder, texture),
                     SlotHandle::Buffer(buffer) => encoder.clear_buffer(buffer, 0, None),
                 }
             }
@@ -460,6 +461,40 @@ fn allocate<W: World>(gpu: &Gpu, plan: &Plan<W>, slot: &crate::plan::Slot) -> Sl
             usage: shape.usage | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         })),
+    }
+}
+
+/// Clearing a texture outright is an optional feature; writing zeros, or clearing a depth attachment, works everywhere.
+fn clear_texture(gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, texture: &wgpu::Texture) {
+    let (layers, format) = (texture.depth_or_array_layers(), texture.format());
+    for mip in 0..texture.mip_level_count() {
+        let [width, height] = [(texture.width() >> mip).max(1), (texture.height() >> mip).max(1)];
+        for layer in 0..layers {
+            if format.is_depth_stencil_format() {
+                let view = texture.create_view(&wgpu::TextureViewDescriptor {
+                    dimension: Some(wgpu::TextureViewDimension::D2),
+                    base_array_layer: layer,
+                    array_layer_count: Some(1),
+                    base_mip_level: mip,
+                    mip_level_count: Some(1),
+                    ..Default::default()
+                });
+                let depth_ops = Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store });
+                let _ = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                    label: Some("clear history"),
+                    depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment { view: &view, depth_ops, stencil_ops: None }),
+                    ..Default::default()
+                });
+            } else {
+                let pitch = width * format.block_copy_size(None).unwrap_or(4);
+                gpu.queue().write_texture(
+                    wgpu::TexelCopyTextureInfo { texture, mip_level: mip, origin: wgpu::Origin3d { x: 0, y: 0, z: layer }, aspect: wgpu::TextureAspect::All },
+                    &vec![0; pitch as usize * height as usize],
+                    wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(pitch), rows_per_image: Some(height) },
+                    wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+                );
+            }
+        }
     }
 }
 
