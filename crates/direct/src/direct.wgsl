@@ -17,6 +17,9 @@ struct Settings {
     bias: f32,
 }
 
+// Largest reflectance and largest irradiance that count; their product is finite.
+const MAX_FACTOR: f32 = 1e18;
+
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<uniform> settings: Settings;
 @group(0) @binding(2) var<storage, read> lights: array<PunctualLight>;
@@ -144,11 +147,12 @@ fn direct(@builtin(global_invocation_id) id: vec3u) {
         let cosine = dot(surface.normal, incident.direction);
         if cosine > 0.0 && max(max(incident.irradiance.x, incident.irradiance.y), incident.irradiance.z) > 0.0 {
             let f = evaluate_brdf(brdf, surface.normal, surface.geometric_normal, incident.direction, to_viewer);
-            var reflected = f * incident.irradiance * cosine;
+            // Bounds far above what a half float holds: infinity times a black channel or a shadow would be NaN.
+            var reflected = min(f * cosine, vec3f(MAX_FACTOR)) * min(incident.irradiance, vec3f(MAX_FACTOR));
 #ifdef SHADOWS
             reflected *= shadow(faces[index], position, surface.geometric_normal);
 #endif
-            total += min(reflected, vec3f(1e30));
+            total = min(total + reflected, vec3f(MAX_FACTOR));
         }
     }
     textureStore(radiance, id.xy, vec4f(storable(total), 1.0));
