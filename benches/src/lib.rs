@@ -1,1 +1,1 @@
-//! Under construction.
+//! Benchmarks live in `benches/`; nothing is exported.

@@ -17,9 +17,12 @@ pub fn atomically(path: &Path, write: impl FnOnce(&mut std::fs::File) -> Result<
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
     };
-    let mut file = tempfile::Builder::new()
-        .prefix(".lobelia-")
-        .suffix(".tmp")
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".lobelia-").suffix(".tmp");
+    // Temporary files are private; what comes of this one is a picture like any other, so the umask decides.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut file = builder
         .tempfile_in(folder)
         .map_err(|error| fail(format!("cannot write there: {error}")))?;
     write(file.as_file_mut()).map_err(fail)?;

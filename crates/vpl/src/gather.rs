@@ -108,7 +108,7 @@ impl Pass for VplGatherPass {
         let extent = inputs.gbuffer.extent;
         let pixels = u64::from(extent[0]) * u64::from(extent[1]);
         if pixels * 16 > MAX_BINDING {
-            let message = format!("a picture of {} x {} pixels needs {} MiB for its sums; at most {} MiB can be bound", extent[0], extent[1], pixels * 16 >> 20, MAX_BINDING >> 20);
+            let message = format!("a picture of {} x {} pixels needs {} MiB for its sums; at most {} MiB can be bound", extent[0], extent[1], (pixels * 16) >> 20, MAX_BINDING >> 20);
             return Err(PortError::at("gbuffer", message).help("render a smaller picture"));
         }
         if let Some(visibility) = &inputs.visibility {
