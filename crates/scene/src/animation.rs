@@ -1,7 +1,7 @@
 //! Keyframe animation of nodes (glTF 2.0, appendix C).
 
 use crate::nodes::Transform;
-use glam::{DQuat, DVec3, DVec4};
+use glam::{DQuat, DVec4};
 
 /// What a channel drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,6 +83,5 @@ impl Channel {
                 }
             }
         }
-        debug_assert!(DVec3::from(value.truncate()).is_finite());
     }
 }

@@ -1,8 +1,6 @@
 //! Scenes made in code, so that nothing need be downloaded to start.
 
-use crate::{
-    Camera, Instance, LightKind, Material, Mesh, PunctualLight, Scene, SceneError, error::suggestion, gltf::area_light::sphere,
-};
+use crate::{Camera, Instance, LightKind, Material, Mesh, PunctualLight, Scene, SceneError, error::suggestion, gltf::area_light::sphere};
 use glam::{DMat4, DVec3, Vec3};
 use std::sync::Arc;
 
@@ -64,7 +62,11 @@ impl Builder {
     fn standing_box(&mut self, name: &str, material: usize, centre: [f32; 2], half: [f32; 2], height: f32, turn: f32) {
         let (sine, cosine) = turn.sin_cos();
         let at = |x: f32, y: f32, z: f32| {
-            Vec3::new(centre[0] + cosine * x * half[0] + sine * z * half[1], y * height, centre[1] - sine * x * half[0] + cosine * z * half[1])
+            Vec3::new(
+                centre[0] + cosine * x * half[0] + sine * z * half[1],
+                y * height,
+                centre[1] - sine * x * half[0] + cosine * z * half[1],
+            )
         };
         let mut mesh = Mesh::default();
         add_quad(&mut mesh, [at(1.0, 0.0, -1.0), at(1.0, 1.0, -1.0), at(1.0, 1.0, 1.0), at(1.0, 0.0, 1.0)]);
@@ -127,8 +129,18 @@ fn cornell(specular: f32) -> Scene {
     build.camera("main", [0.0, 1.0, 3.6], [0.0, 0.986_112_450_509_242_2, 2.600_096_436_665_444_5], 0.698_131_700_797_731_8);
     let ahead = |origin: [f64; 3], back: [f64; 3]| [origin[0] - back[0], origin[1] - back[1], origin[2] - back[2]];
     let (side, low) = ([0.85, 1.5, 0.95], [-0.7, 0.25, 0.95]);
-    build.camera("side", side, ahead(side, [0.567_196_851_467_116_4, 0.504_174_979_081_881_9, 0.651_226_014_647_429_8]), 1.047_197_551_196_597_6);
-    build.camera("low", low, ahead(low, [-0.612_655_718_514_155_4, -0.141_382_088_887_881_95, 0.777_601_488_883_350_6]), 1.134_464_013_796_314_2);
+    build.camera(
+        "side",
+        side,
+        ahead(side, [0.567_196_851_467_116_4, 0.504_174_979_081_881_9, 0.651_226_014_647_429_8]),
+        1.047_197_551_196_597_6,
+    );
+    build.camera(
+        "low",
+        low,
+        ahead(low, [-0.612_655_718_514_155_4, -0.141_382_088_887_881_95, 0.777_601_488_883_350_6]),
+        1.134_464_013_796_314_2,
+    );
     let mut scene = build.finish();
     for material in &mut scene.materials {
         material.specular = specular;
@@ -156,10 +168,12 @@ fn lathe(strips: &[Vec<[f32; 2]>], segments: u32) -> Mesh {
             }
         }
         let rows = strip.len() as u32;
-        for segment in 0..segments {
-            for row in 0..rows - 1 {
-                let a = start + segment * rows + row;
-                mesh.indices.extend([a, a + rows, a + rows + 1, a, a + rows + 1, a + 1]);
+        for [second, third] in [[rows, rows + 1], [rows + 1, 1]] {
+            for segment in 0..segments {
+                for row in 0..rows - 1 {
+                    let first = start + segment * rows + row;
+                    mesh.indices.extend([first, first + second, first + third]);
+                }
             }
         }
     }
@@ -185,7 +199,12 @@ fn ring() -> Scene {
     let direction = DVec3::new(0.714_005_547_295_416_6, -0.686_543_795_476_362_2, -0.137_308_759_095_272_46);
     let kind = LightKind::Spot { inner: 0.209_439_51, outer: 0.418_879_02 };
     build.light("spot", kind, DVec3::new(-2.6, 2.6, 0.5), direction, Vec3::splat(60.0));
-    build.camera("main", [0.6, 3.0, 2.9], [0.455_242_967_803_985_77, 2.300_341_011_052_598, 2.200_341_011_052_598], 0.663_225_115_757_845_3);
+    build.camera(
+        "main",
+        [0.6, 3.0, 2.9],
+        [0.455_242_967_803_985_77, 2.300_341_011_052_598, 2.200_341_011_052_598],
+        0.663_225_115_757_845_3,
+    );
     let (low, back) = ([1.9, 1.1, 2.2], [0.618_070_046_200_737_7, 0.325_300_024_316_177_7, 0.715_660_053_495_591]);
     build.camera("low", low, [low[0] - back[0], low[1] - back[1], low[2] - back[2]], 0.698_131_700_797_731_8);
     build.finish()

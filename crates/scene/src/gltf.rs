@@ -11,8 +11,7 @@ mod primitive;
 mod tree;
 
 use crate::{
-    AlphaMode, AreaLight, Camera, Instance, LightKind, Material, Mesh, PunctualLight, Sampler, Scene, SceneError, TextureRef, Wrap,
-    files,
+    AlphaMode, AreaLight, Camera, Instance, LightKind, Material, Mesh, PunctualLight, Sampler, Scene, SceneError, TextureRef, Wrap, files,
 };
 use accessor::Buffers;
 use base64::Engine;
@@ -24,7 +23,7 @@ use std::{collections::HashMap, path::Path, sync::Arc};
 const KNOWN_EXTENSIONS: [&str; 2] = ["KHR_lights_punctual", "KHR_materials_emissive_strength"];
 
 /// Most vertices and most triangles that all meshes together may have. A file can use the same numbers many times over, so its own size is no bound.
-const MAX_MESH_ELEMENTS: usize = 1 << 25;
+const MAX_MESH_ELEMENTS: usize = 1 << 24;
 
 /// Most area lights: each brings a surface of its own.
 const MAX_AREA_LIGHTS: usize = 4096;
@@ -40,13 +39,17 @@ pub(crate) fn load(path: &Path) -> Result<Scene, SceneError> {
 pub(crate) fn parse(bytes: &[u8], shown: &str, folder: Option<&Path>) -> Result<Scene, SceneError> {
     let mut gltf = open::open(bytes, shown)?;
     let buffers = Buffers::load(&mut gltf, shown, folder)?;
-    let mut loader = Loader { shown, scene: Scene::default(), buffers, primitives: HashMap::new(), meshes: Vec::new(), mesh_elements: 0 };
+    let mut loader =
+        Loader { shown, scene: Scene::default(), buffers, primitives: HashMap::new(), meshes: Vec::new(), mesh_elements: 0, dropped: None };
     loader.extensions(&gltf);
     loader.scene.textures = Arc::new(image::load(&gltf, &loader.buffers, shown, folder)?);
     loader.materials(&gltf)?;
     let order = loader.nodes(&gltf)?;
     loader.animations(&gltf, &order)?;
     loader.contents(&gltf, &order)?;
+    if let Some((count, at)) = loader.dropped.take() {
+        loader.warn(format!("triangles without area are dropped: {count}, first in {at}"));
+    }
     let Loader { mut scene, meshes, .. } = loader;
     scene.meshes = Arc::new(meshes);
     scene.place_nodes();
@@ -62,7 +65,9 @@ pub(crate) fn parse(bytes: &[u8], shown: &str, folder: Option<&Path>) -> Result<
 fn read_uri(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>, String> {
     if let Some(data) = uri.strip_prefix("data:") {
         let (_, encoded) = data.split_once(";base64,").ok_or("a data URI without base64 data")?;
-        return base64::engine::general_purpose::STANDARD.decode(encoded).map_err(|error| format!("a data URI with broken base64: {error}"));
+        return base64::engine::general_purpose::STANDARD
+            .decode(encoded)
+            .map_err(|error| format!("a data URI with broken base64: {error}"));
     }
     let path = folder.unwrap_or(Path::new(".")).join(percent_decoded(uri));
     files::read(&path).map_err(|reason| format!("{}: cannot be read: {reason}", path.display()))
@@ -96,6 +101,8 @@ struct Loader<'a> {
     meshes: Vec<Mesh>,
     /// Vertices and triangles read so far.
     mesh_elements: usize,
+    /// How many triangles had no area, and where the first was.
+    dropped: Option<(usize, String)>,
 }
 
 impl Loader<'_> {
@@ -150,7 +157,9 @@ impl Loader<'_> {
             emissive_texture: material.emissive_texture().map(|info| self.texture(&name, &info.texture(), info.tex_coord())),
             alpha_mode: match material.alpha_mode() {
                 gltf::material::AlphaMode::Opaque => AlphaMode::Opaque,
-                gltf::material::AlphaMode::Mask => AlphaMode::Mask { cutoff: texture_cutoff(material.alpha_cutoff().unwrap_or(0.5), opacity) },
+                gltf::material::AlphaMode::Mask => {
+                    AlphaMode::Mask { cutoff: texture_cutoff(material.alpha_cutoff().unwrap_or(0.5), opacity) }
+                }
                 gltf::material::AlphaMode::Blend => {
                     self.warn("blended materials are drawn opaque");
                     AlphaMode::Opaque
@@ -168,7 +177,10 @@ impl Loader<'_> {
         {
             return Err(self.fail(format!("material `{}`: its alphaCutoff is negative", read.name)));
         }
-        let numbers = [read.metallic, read.roughness, read.normal_scale].into_iter().chain(read.base_color.to_array()).chain(read.emissive.to_array());
+        let numbers = [read.metallic, read.roughness, read.normal_scale]
+            .into_iter()
+            .chain(read.base_color.to_array())
+            .chain(read.emissive.to_array());
         if numbers.clone().any(|number| !number.is_finite()) || read.emissive.min_element() < 0.0 {
             return Err(self.fail(format!("material `{}`: factors must be finite and emission not negative", read.name)));
         }
@@ -190,7 +202,10 @@ impl Loader<'_> {
         };
         let sampler = texture.sampler();
         let nearest = sampler.mag_filter() == Some(gltf::texture::MagFilter::Nearest);
-        TextureRef { texture: texture.source().index(), sampler: Sampler { wrap_u: wrap(sampler.wrap_s()), wrap_v: wrap(sampler.wrap_t()), nearest } }
+        TextureRef {
+            texture: texture.source().index(),
+            sampler: Sampler { wrap_u: wrap(sampler.wrap_s()), wrap_v: wrap(sampler.wrap_t()), nearest },
+        }
     }
 
     /// Meshes, lights and cameras that hang on nodes.
@@ -234,7 +249,13 @@ impl Loader<'_> {
                 }
             };
             if let Some(mesh) = read {
-                self.scene.instances.push(Instance { mesh, world_from_local: DMat4::IDENTITY, name: name.to_owned(), area_light: None, node: Some(node) });
+                self.scene.instances.push(Instance {
+                    mesh,
+                    world_from_local: DMat4::IDENTITY,
+                    name: name.to_owned(),
+                    area_light: None,
+                    node: Some(node),
+                });
             }
         }
         Ok(())
@@ -244,11 +265,14 @@ impl Loader<'_> {
         let at = format!("mesh {}, primitive {}", mesh.index(), primitive.index());
         let material = primitive.material().index().unwrap_or(self.scene.materials.len() - 1);
         let needs_tangents = self.scene.materials[material].normal_texture.is_some();
-        let (read, warnings) = primitive::read(&self.buffers, self.shown, &at, primitive, needs_tangents)?;
-        for warning in warnings {
+        let read = primitive::read(&self.buffers, self.shown, &at, primitive, needs_tangents)?;
+        for warning in read.warnings {
             self.warn(warning);
         }
-        let Some(mut mesh) = read else { return Ok(None) };
+        if read.dropped > 0 {
+            self.dropped.get_or_insert((0, at.clone())).0 += read.dropped;
+        }
+        let Some(mut mesh) = read.mesh else { return Ok(None) };
         self.mesh_elements += mesh.positions.len() + mesh.indices.len() / 3;
         if self.mesh_elements > MAX_MESH_ELEMENTS {
             return Err(self.fail(format!("{at}: the meshes have more than {MAX_MESH_ELEMENTS} vertices and triangles")));
@@ -269,7 +293,15 @@ impl Loader<'_> {
         }
         let intensity = Vec3::from_array(light.color()) * light.intensity();
         check_light(kind, intensity).map_err(|message| self.fail(format!("light `{name}`: {message}")))?;
-        let light = PunctualLight { name: name.to_owned(), kind, position: DVec3::ZERO, direction: DVec3::NEG_Z, intensity, animated, node: Some(node) };
+        let light = PunctualLight {
+            name: name.to_owned(),
+            kind,
+            position: DVec3::ZERO,
+            direction: DVec3::NEG_Z,
+            intensity,
+            animated,
+            node: Some(node),
+        };
         self.scene.lights.push(light);
         Ok(())
     }
@@ -277,7 +309,9 @@ impl Loader<'_> {
     fn camera(&mut self, camera: &gltf::Camera<'_>, node: usize, name: &str) -> Result<(), SceneError> {
         let (yfov, near, unusable) = match camera.projection() {
             gltf::camera::Projection::Perspective(perspective) => (f64::from(perspective.yfov()), f64::from(perspective.znear()), None),
-            gltf::camera::Projection::Orthographic(_) => (1.0, 1.0, Some("it is orthographic; only perspective cameras are supported".to_owned())),
+            gltf::camera::Projection::Orthographic(_) => {
+                (1.0, 1.0, Some("it is orthographic; only perspective cameras are supported".to_owned()))
+            }
         };
         let unusable = unusable.or_else(|| {
             let fine = yfov > 1e-4 && yfov < std::f64::consts::PI - 1e-4 && near > 0.0 && near.is_finite();
@@ -309,4 +343,3 @@ pub(crate) fn check_light(kind: LightKind, intensity: Vec3) -> Result<(), String
     }
     Ok(())
 }
-

@@ -112,9 +112,19 @@ impl Scene {
             let what = format!("all instances together have {triangles} triangles; at most {MAX_TRIANGLES} are drawn");
             return Err(SceneError::content(&self.name, what));
         }
+        let within_floats = |instance: &Instance| instance.world_from_local.to_cols_array().iter().all(|number| number.abs() < 1e30);
+        if let Some(instance) = self.instances.iter().find(|instance| !within_floats(instance)) {
+            return Err(SceneError::content(
+                &self.name,
+                format!("node `{}`: its transform is beyond the range of 32-bit floats", instance.name),
+            ));
+        }
         let bounds = self.bounds();
         if !bounds.is_finite() || (bounds.max - bounds.min).max_element() > MAX_REACH {
-            let what = format!("the scene reaches from {} to {}; positions must be finite and within {MAX_REACH:e} m of each other", bounds.min, bounds.max);
+            let what = format!(
+                "the scene reaches from {} to {}; positions must be finite and within {MAX_REACH:e} m of each other",
+                bounds.min, bounds.max
+            );
             return Err(SceneError::content(&self.name, what));
         }
         let lights = self.lights.iter().map(|light| ("light", &light.name, light.position));
@@ -122,7 +132,8 @@ impl Scene {
         let origin = self.origin();
         for (kind, name, position) in lights.chain(cameras) {
             if !position.is_finite() || (position - origin).abs().max_element() > MAX_REACH {
-                let what = format!("{kind} `{name}` is at {position}; it must be within {MAX_REACH:e} m of the scene, which is at {origin}");
+                let what =
+                    format!("{kind} `{name}` is at {position}; it must be within {MAX_REACH:e} m of the scene, which is at {origin}");
                 return Err(SceneError::content(&self.name, what));
             }
         }
@@ -195,7 +206,12 @@ impl Scene {
             (None, None | Some("whole-scene")) => Ok(self.whole_scene_camera()),
             (None, Some(name)) => {
                 let known: Vec<&str> = self.cameras.iter().map(|camera| camera.name.as_str()).collect();
-                Err(SceneError::UnknownName { file: self.name.clone(), what: "camera", name: name.into(), help: error::suggestion(name, &known) })
+                Err(SceneError::UnknownName {
+                    file: self.name.clone(),
+                    what: "camera",
+                    name: name.into(),
+                    help: error::suggestion(name, &known),
+                })
             }
         }
     }

@@ -36,3 +36,37 @@ pub(crate) fn generate(mesh: &mut Mesh) -> bool {
     let made = bevy_mikktspace::generate_tangents(&mut Corners(mesh)).is_ok();
     made && mesh.tangents.iter().any(|tangent| tangent.truncate() != Vec3::ZERO)
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use crate::Scene;
+    use glam::Vec4;
+
+    /// Tangents that other programs wrote into files, generated anew.
+    #[test]
+    fn generated_tangents_are_those_of_files_that_have_them() {
+        let root = std::env::var("LOBELIA_SHARED").unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared").into());
+        for file in ["scenes/atrium/atrium.glb", "scenes/flight-helmet/FlightHelmet.gltf"] {
+            let path = format!("{root}/{file}");
+            if !std::path::Path::new(&path).exists() {
+                eprintln!("skipped: {path} is not there (LOBELIA_SHARED names another place)");
+                continue;
+            }
+            let scene = Scene::load(&path).unwrap();
+            let (mut corners, mut same) = (0, 0);
+            for mesh in scene.meshes.iter().filter(|mesh| mesh.tangents.iter().any(|tangent| *tangent != Vec4::ZERO)) {
+                let mut anew = mesh.clone();
+                assert!(super::generate(&mut anew));
+                for (corner, index) in mesh.indices.iter().enumerate() {
+                    let (theirs, ours) = (mesh.tangents[*index as usize], anew.tangents[corner]);
+                    corners += 1;
+                    // Programs differ a little where they weld vertices; the handedness must never differ.
+                    same += usize::from(theirs.truncate().dot(ours.truncate()) > 0.99 && theirs.w == ours.w);
+                }
+            }
+            assert!(corners > 10_000 && same as f64 > 0.98 * corners as f64, "{file}: {same} of {corners} tangents are the same");
+        }
+    }
+}

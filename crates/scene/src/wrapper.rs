@@ -28,11 +28,11 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Ordered<T> {
             }
             fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
                 let mut entries: Vec<(String, T)> = Vec::new();
-                while let Some((name, value)) = map.next_entry::<String, T>()? {
+                while let Some(name) = map.next_key::<String>()? {
                     if entries.iter().any(|(known, _)| *known == name) {
                         return Err(serde::de::Error::custom(format!("duplicate name `{name}`")));
                     }
-                    entries.push((name, value));
+                    entries.push((name, map.next_value()?));
                 }
                 Ok(Ordered(entries))
             }
@@ -96,9 +96,22 @@ fn usual_yfov() -> f64 {
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 enum WrittenLight {
-    Point { position: (f64, f64, f64), intensity: (f32, f32, f32) },
-    Spot { position: (f64, f64, f64), direction: (f64, f64, f64), intensity: (f32, f32, f32), #[serde(default)] inner: f32, outer: f32 },
-    Directional { direction: (f64, f64, f64), illuminance: (f32, f32, f32) },
+    Point {
+        position: (f64, f64, f64),
+        intensity: (f32, f32, f32),
+    },
+    Spot {
+        position: (f64, f64, f64),
+        direction: (f64, f64, f64),
+        intensity: (f32, f32, f32),
+        #[serde(default)]
+        inner: f32,
+        outer: f32,
+    },
+    Directional {
+        direction: (f64, f64, f64),
+        illuminance: (f32, f32, f32),
+    },
 }
 
 #[derive(Debug, Deserialize)]
@@ -151,7 +164,11 @@ impl Entry<'_> {
     }
 
     fn unit(&self, field: &str, value: f32) -> Result<f32, SceneError> {
-        if (0.0..=1.0).contains(&value) { Ok(value) } else { Err(self.fail(field, format_args!("{field} is {value}, but must lie in [0, 1]"))) }
+        if (0.0..=1.0).contains(&value) {
+            Ok(value)
+        } else {
+            Err(self.fail(field, format_args!("{field} is {value}, but must lie in [0, 1]")))
+        }
     }
 }
 
@@ -224,7 +241,8 @@ fn load_environment(file: &File<'_>, written: &WrittenEnvironment, folder: &Path
 }
 
 fn decode(bytes: &[u8]) -> Result<image::Rgb32FImage, String> {
-    let mut reader = image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|error| format!("cannot be read: {error}"))?;
+    let mut reader =
+        image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|error| format!("cannot be read: {error}"))?;
     let mut limits = image::Limits::default();
     (limits.max_image_width, limits.max_image_height, limits.max_alloc) = (Some(MAX_SIDE), Some(MAX_SIDE), Some(1 << 30));
     reader.limits(limits);
@@ -281,8 +299,12 @@ fn add_lights(file: &File<'_>, scene: &mut Scene, lights: &Ordered<WrittenLight>
 
 fn change_materials(file: &File<'_>, scene: &mut Scene, changes: &Ordered<WrittenMaterial>) -> Result<(), SceneError> {
     // The surfaces of area lights stay what they are.
-    let light_surfaces: Vec<usize> =
-        scene.instances.iter().filter(|instance| instance.area_light.is_some()).map(|instance| scene.meshes[instance.mesh].material).collect();
+    let light_surfaces: Vec<usize> = scene
+        .instances
+        .iter()
+        .filter(|instance| instance.area_light.is_some())
+        .map(|instance| scene.meshes[instance.mesh].material)
+        .collect();
     for (name, change) in &changes.0 {
         let surfaces = scene.materials.iter_mut().enumerate().filter(|(index, _)| !light_surfaces.contains(index));
         let mut materials: Vec<_> = surfaces.map(|(_, material)| material).collect();

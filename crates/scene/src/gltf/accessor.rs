@@ -31,7 +31,9 @@ impl Buffers {
         for buffer in gltf.buffers() {
             let fail = |message: String| SceneError::content(shown, format!("buffer {}: {message}", buffer.index()));
             let bytes = match buffer.source() {
-                gltf::buffer::Source::Bin if buffer.index() > 0 => return Err(fail("it has no uri; only buffer 0 may be the binary chunk".into())),
+                gltf::buffer::Source::Bin if buffer.index() > 0 => {
+                    return Err(fail("it has no uri; only buffer 0 may be the binary chunk".into()));
+                }
                 gltf::buffer::Source::Bin => blob.take().ok_or_else(|| fail("it has no uri and the file no binary chunk".into()))?,
                 gltf::buffer::Source::Uri(uri) => read_uri(uri, folder).map_err(fail)?,
             };
@@ -146,11 +148,12 @@ impl Buffers {
         self.elements(shown, accessor, width, |kind, normalized, bytes| match (kind, bytes) {
             (DataType::F32, [a, b, c, d]) => f32::from_le_bytes([*a, *b, *c, *d]),
             (DataType::U8, [a]) => f32::from(*a) / if normalized { 255.0 } else { 1.0 },
-            (DataType::I8, [a]) => (f32::from(*a as i8) / if normalized { 127.0 } else { 1.0 }).max(if normalized { -1.0 } else { f32::MIN }),
-            (DataType::U16, [a, b]) => f32::from(u16::from_le_bytes([*a, *b])) / if normalized { 65535.0 } else { 1.0 },
-            (DataType::I16, [a, b]) => {
-                (f32::from(i16::from_le_bytes([*a, *b])) / if normalized { 32767.0 } else { 1.0 }).max(if normalized { -1.0 } else { f32::MIN })
+            (DataType::I8, [a]) => {
+                (f32::from(*a as i8) / if normalized { 127.0 } else { 1.0 }).max(if normalized { -1.0 } else { f32::MIN })
             }
+            (DataType::U16, [a, b]) => f32::from(u16::from_le_bytes([*a, *b])) / if normalized { 65535.0 } else { 1.0 },
+            (DataType::I16, [a, b]) => (f32::from(i16::from_le_bytes([*a, *b])) / if normalized { 32767.0 } else { 1.0 })
+                .max(if normalized { -1.0 } else { f32::MIN }),
             (DataType::U32, [a, b, c, d]) => u32::from_le_bytes([*a, *b, *c, *d]) as f32,
             _ => f32::NAN,
         })

@@ -67,7 +67,13 @@ pub(crate) fn add_surface(scene: &mut Scene, index: usize) {
     let meshes = Arc::make_mut(&mut scene.meshes);
     meshes.push(mesh);
     let mesh = meshes.len() - 1;
-    scene.instances.push(Instance { mesh, world_from_local: light.world_from_local, name: light.name, area_light: Some(index), node: light.node });
+    scene.instances.push(Instance {
+        mesh,
+        world_from_local: light.world_from_local,
+        name: light.name,
+        area_light: Some(index),
+        node: light.node,
+    });
 }
 
 /// Front towards -Z.
@@ -100,8 +106,10 @@ pub(crate) fn sphere(radius: f32, segments: u32, rings: u32) -> Mesh {
     let mut mesh = Mesh::default();
     for ring in 0..=rings {
         let (sine, cosine) = (PI * ring as f32 / rings as f32).sin_cos();
+        // In floats the sine of pi is not 0, and the pole would be a ring of slivers that face anywhere.
+        let sine = if ring == rings { 0.0 } else { sine };
         for segment in 0..=segments {
-            let around = Vec2::from_angle(2.0 * PI * segment as f32 / segments as f32);
+            let around = Vec2::from_angle(2.0 * PI * (segment % segments) as f32 / segments as f32);
             let normal = Vec3::new(sine * around.x, cosine, -sine * around.y);
             mesh.positions.push(normal * radius);
             mesh.normals.push(normal);
@@ -110,11 +118,15 @@ pub(crate) fn sphere(radius: f32, segments: u32, rings: u32) -> Mesh {
     }
     for ring in 0..rings {
         for segment in 0..segments {
-            let a = ring * (segments + 1) + segment;
-            let b = a + segments + 1;
-            mesh.indices.extend([a, b, b + 1, a, b + 1, a + 1]);
+            let above = ring * (segments + 1) + segment;
+            let below = above + segments + 1;
+            if ring + 1 < rings {
+                mesh.indices.extend([above, below, below + 1]);
+            }
+            if ring > 0 {
+                mesh.indices.extend([above, below + 1, above + 1]);
+            }
         }
     }
-    mesh.drop_degenerate();
     mesh
 }

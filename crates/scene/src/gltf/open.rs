@@ -17,7 +17,8 @@ pub(crate) fn open(bytes: &[u8], shown: &str) -> Result<gltf::Gltf, SceneError> 
     if bytes.starts_with(b"glTF") {
         check_glb_length(bytes).map_err(fail)?;
     }
-    let unchecked = gltf::Gltf::from_slice_without_validation(bytes).map_err(|error| fail(format!("not a valid glTF 2.0 file: {error}")))?;
+    let unchecked =
+        gltf::Gltf::from_slice_without_validation(bytes).map_err(|error| fail(format!("not a valid glTF 2.0 file: {error}")))?;
     check_required_extensions(unchecked.document.as_json()).map_err(fail)?;
     check_what_validation_trusts(unchecked.document.as_json()).map_err(fail)?;
     let document = gltf::Document::from_json(unchecked.document.into_json()).map_err(|error| fail(explain(&error)))?;
@@ -54,6 +55,18 @@ fn check_what_validation_trusts(root: &Root) -> Result<(), String> {
                     "mesh {mesh_index}, primitive {primitive_index}: POSITION is accessor {index}, but there are {} accessors",
                     root.accessors.len()
                 ));
+            }
+        }
+    }
+    for (animation_index, animation) in root.animations.iter().enumerate() {
+        for (channel_index, channel) in animation.channels.iter().enumerate() {
+            let at = format!("animation {animation_index}, channel {channel_index}");
+            let node = channel.target.node.value();
+            if node >= root.nodes.len() {
+                return Err(format!("{at}: it moves node {node}, but there are {} nodes", root.nodes.len()));
+            }
+            if channel.target.path == Checked::Invalid {
+                return Err(format!("{at}: its path is none of translation, rotation, scale, weights"));
             }
         }
     }

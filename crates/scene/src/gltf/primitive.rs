@@ -5,19 +5,30 @@ use crate::{Mesh, SceneError, tangents};
 use glam::{Vec2, Vec3, Vec4};
 use gltf::{Semantic, mesh::Mode};
 
-/// A mesh (if there is anything to draw) and warnings.
+/// What a primitive gives.
+#[derive(Default)]
+pub(crate) struct Read {
+    /// Nothing, if there is nothing to draw.
+    pub mesh: Option<Mesh>,
+    /// What is not done as the file asks.
+    pub warnings: Vec<String>,
+    /// How many triangles had no area.
+    pub dropped: usize,
+}
+
+/// Reads a primitive; `at` says where it stands.
 pub(crate) fn read(
     buffers: &Buffers,
     shown: &str,
     at: &str,
     primitive: &gltf::Primitive<'_>,
     needs_tangents: bool,
-) -> Result<(Option<Mesh>, Vec<String>), SceneError> {
+) -> Result<Read, SceneError> {
     let fail = |message: String| SceneError::content(shown, format!("{at}: {message}"));
     let mut warnings = Vec::new();
     if !matches!(primitive.mode(), Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
         warnings.push("points and lines are not drawn".to_owned());
-        return Ok((None, warnings));
+        return Ok(Read { warnings, ..Read::default() });
     }
     if primitive.morph_targets().len() > 0 {
         warnings.push("morph targets are ignored".to_owned());
@@ -63,11 +74,8 @@ pub(crate) fn read(
     }
     mesh.indices = triangles(primitive.mode(), &indices);
     let dropped = mesh.drop_degenerate();
-    if dropped > 0 {
-        warnings.push(format!("{at}: {dropped} triangles without area are dropped"));
-    }
     if mesh.indices.is_empty() {
-        return Ok((None, warnings));
+        return Ok(Read { mesh: None, warnings, dropped });
     }
     if normals.is_none() {
         mesh.flat_normals();
@@ -78,7 +86,7 @@ pub(crate) fn read(
         warnings.push(format!("{at}: its normal map is ignored, for it has no usable texture coordinates"));
     }
     mesh.fill();
-    Ok((Some(mesh), warnings))
+    Ok(Read { mesh: Some(mesh), warnings, dropped })
 }
 
 /// Unit, with a handedness of 1 or -1; all 0, which stands for none, where it has no direction.
@@ -95,7 +103,13 @@ fn triangles(mode: Mode, indices: &[u32]) -> Vec<u32> {
     match mode {
         Mode::TriangleStrip => {
             let windows = indices.windows(3).enumerate();
-            windows.flat_map(|(place, corners)| if place % 2 == 0 { [corners[0], corners[1], corners[2]] } else { [corners[1], corners[0], corners[2]] }).collect()
+            windows
+                .flat_map(
+                    |(place, corners)| {
+                        if place % 2 == 0 { [corners[0], corners[1], corners[2]] } else { [corners[1], corners[0], corners[2]] }
+                    },
+                )
+                .collect()
         }
         Mode::TriangleFan => indices.windows(2).skip(1).flat_map(|pair| [indices[0], pair[0], pair[1]]).collect(),
         _ => indices.chunks_exact(3).flatten().copied().collect(),

@@ -88,7 +88,9 @@ impl Loader<'_> {
 
     fn transform(&self, node: &gltf::Node<'_>) -> Result<Transform, SceneError> {
         let transform = match node.transform() {
-            gltf::scene::Transform::Matrix { matrix } => Transform::Matrix(DMat4::from_cols_array_2d(&matrix.map(|column| column.map(f64::from)))),
+            gltf::scene::Transform::Matrix { matrix } => {
+                Transform::Matrix(DMat4::from_cols_array_2d(&matrix.map(|column| column.map(f64::from))))
+            }
             gltf::scene::Transform::Decomposed { translation, rotation, scale } => {
                 let rotation = DQuat::from_array(rotation.map(f64::from));
                 if rotation.length_squared() <= 0.0 {
@@ -151,7 +153,9 @@ impl Loader<'_> {
         if times.iter().chain(&numbers).any(|number| !number.is_finite()) || times.windows(2).any(|pair| pair[0] >= pair[1]) {
             return Err(self.fail(format!("{at}: key times must rise and all numbers be finite")));
         }
-        let value = |numbers: &[f32]| DVec4::new(numbers[0].into(), numbers[1].into(), numbers[2].into(), numbers.get(3).map_or(0.0, |w| f64::from(*w)));
+        let value = |numbers: &[f32]| {
+            DVec4::new(numbers[0].into(), numbers[1].into(), numbers[2].into(), numbers.get(3).map_or(0.0, |w| f64::from(*w)))
+        };
         let values: Vec<DVec4> = numbers.chunks_exact(width).map(value).collect();
         // Of a spline's triples only the middle one is a rotation, the others are tangents.
         let mut rotations = values.iter().skip(usize::from(per_key == 3)).step_by(per_key);

@@ -1,0 +1,203 @@
+//! What shaders read, laid out as `shaders/lobelia/scene.wgsl` says.
+
+use crate::{AlphaMode, Camera, LightKind, Material, Scene};
+use encase::{ShaderType, StorageBuffer, UniformBuffer};
+use glam::{DMat4, DVec3, DVec4, Mat4, Vec2, Vec3, Vec4};
+
+/// The camera of one frame, as shaders see it.
+#[derive(Clone, Copy, Debug, PartialEq, ShaderType)]
+pub struct ViewUniform {
+    /// Reverse Z, infinite far plane: depth is `near / view depth`.
+    pub clip_from_scene: Mat4,
+    /// That of the frame before, with the jitter of that frame.
+    pub previous_clip_from_scene: Mat4,
+    /// Camera, scene space.
+    pub position: Vec3,
+    /// Metres.
+    pub near: f32,
+    /// Unit.
+    pub forward: Vec3,
+    /// Frame index.
+    pub frame: u32,
+    /// Times `aspect * tan(yfov / 2)`.
+    pub right: Vec3,
+    /// Seed of everything random.
+    pub seed: u32,
+    /// Times `tan(yfov / 2)`.
+    pub up: Vec3,
+    /// Unused.
+    pub padding: u32,
+    /// Pixels.
+    pub extent: Vec2,
+    /// Added to sample positions, pixels.
+    pub jitter: Vec2,
+}
+
+impl ViewUniform {
+    /// The view of `camera` over a picture of `extent` pixels; the aspect ratio is the picture's. `jitter` moves the sample position within each
+    /// pixel, in pixels, y down.
+    pub fn new(
+        camera: &Camera,
+        origin: DVec3,
+        extent: [u32; 2],
+        jitter: Vec2,
+        frame: u32,
+        seed: u32,
+        previous: Option<&ViewUniform>,
+    ) -> Self {
+        let [width, height] = extent.map(f64::from);
+        let tangent = (camera.yfov / 2.0).tan();
+        let (scale_x, scale_y) = (tangent * width / height, tangent);
+        let position = camera.position - origin;
+        let row = |axis: DVec3| axis.extend(-axis.dot(position));
+        let forward = row(camera.forward);
+        // What lies at pixel centre + jitter must land on the pixel centre, where the rasteriser samples.
+        let x = row(camera.right) / scale_x - forward * (2.0 * f64::from(jitter.x) / width);
+        let y = row(camera.up) / scale_y + forward * (2.0 * f64::from(jitter.y) / height);
+        let z = DVec4::new(0.0, 0.0, 0.0, camera.near);
+        let clip_from_scene = DMat4::from_cols(x, y, z, forward).transpose().as_mat4();
+        Self {
+            clip_from_scene,
+            previous_clip_from_scene: previous.map_or(clip_from_scene, |view| view.clip_from_scene),
+            position: position.as_vec3(),
+            near: camera.near as f32,
+            forward: camera.forward.as_vec3(),
+            frame,
+            right: (camera.right * scale_x).as_vec3(),
+            seed,
+            up: (camera.up * scale_y).as_vec3(),
+            padding: 0,
+            extent: Vec2::new(width as f32, height as f32),
+            jitter,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, ShaderType)]
+struct LightUniform {
+    position: Vec3,
+    kind: u32,
+    direction: Vec3,
+    cos_outer: f32,
+    intensity: Vec3,
+    spot_scale: f32,
+}
+
+#[derive(Clone, Copy, Debug, ShaderType)]
+struct InstanceUniform {
+    scene_from_local: Mat4,
+    normal_column_x: Vec4,
+    normal_column_y: Vec4,
+    normal_column_z: Vec4,
+}
+
+#[derive(Clone, Copy, Debug, ShaderType)]
+pub(super) struct MaterialUniform {
+    base_color: Vec3,
+    metallic: f32,
+    emissive: Vec3,
+    roughness: f32,
+    specular: f32,
+    normal_scale: f32,
+    alpha_cutoff: f32,
+    flags: u32,
+}
+
+pub(super) fn light_bytes(scene: &Scene) -> Vec<u8> {
+    let origin = scene.origin();
+    let mut lights: Vec<LightUniform> = scene
+        .lights
+        .iter()
+        .map(|light| {
+            let (kind, cos_outer, spot_scale) = match light.kind {
+                LightKind::Point => (0, -1.0, 0.0),
+                LightKind::Spot { inner, outer } => {
+                    // In f64: cosines of small angles are nearly equal.
+                    let (cos_inner, cos_outer) = (f64::from(inner).cos(), f64::from(outer).cos());
+                    (1, cos_outer as f32, (1.0 / (cos_inner - cos_outer).max(0.001)) as f32)
+                }
+                LightKind::Directional => (2, -1.0, 0.0),
+            };
+            LightUniform {
+                position: (light.position - origin).as_vec3(),
+                kind,
+                direction: light.direction.as_vec3(),
+                cos_outer,
+                intensity: light.intensity,
+                spot_scale,
+            }
+        })
+        .collect();
+    if lights.is_empty() {
+        // An empty array cannot be bound; a dark light changes nothing.
+        lights.push(LightUniform {
+            position: Vec3::ZERO,
+            kind: 0,
+            direction: Vec3::NEG_Y,
+            cos_outer: -1.0,
+            intensity: Vec3::ZERO,
+            spot_scale: 0.0,
+        });
+    }
+    storage_bytes(&lights)
+}
+
+pub(super) fn instance_bytes(scene: &Scene) -> Vec<u8> {
+    let scene_from_world = DMat4::from_translation(-scene.origin());
+    let instances: Vec<InstanceUniform> = scene
+        .instances
+        .iter()
+        .map(|instance| {
+            let matrix = scene_from_world * instance.world_from_local;
+            let linear = glam::DMat3::from_mat4(matrix);
+            let determinant = linear.determinant();
+            // The cofactor matrix is the inverse transpose times the determinant: it exists for flattened instances too.
+            let [x, y, z] = [linear.x_axis, linear.y_axis, linear.z_axis];
+            let sign = if determinant < 0.0 { -1.0 } else { 1.0 };
+            let cofactor = [y.cross(z), z.cross(x), x.cross(y)].map(|column| column * sign);
+            // Only directions matter; a common scale keeps tiny and huge instances within floats.
+            let largest = cofactor.iter().map(|column| column.abs().max_element()).fold(f64::MIN_POSITIVE, f64::max);
+            let [cx, cy, cz] = cofactor.map(|column| (column / largest).as_vec3());
+            InstanceUniform {
+                scene_from_local: matrix.as_mat4(),
+                normal_column_x: cx.extend(sign as f32),
+                normal_column_y: cy.extend(0.0),
+                normal_column_z: cz.extend(0.0),
+            }
+        })
+        .collect();
+    storage_bytes(&instances)
+}
+
+pub(super) fn view_bytes(view: &ViewUniform) -> Vec<u8> {
+    uniform_bytes(view)
+}
+
+pub(super) fn material_bytes(material: &Material) -> Vec<u8> {
+    uniform_bytes(&MaterialUniform {
+        base_color: material.base_color,
+        metallic: material.metallic,
+        emissive: material.emissive,
+        roughness: material.roughness,
+        specular: material.specular,
+        normal_scale: if material.normal_texture.is_some() { material.normal_scale } else { 0.0 },
+        alpha_cutoff: match material.alpha_mode {
+            AlphaMode::Opaque => 0.0,
+            AlphaMode::Mask { cutoff } => cutoff,
+        },
+        flags: 0,
+    })
+}
+
+fn uniform_bytes<T: ShaderType + encase::internal::WriteInto>(value: &T) -> Vec<u8> {
+    let mut bytes = UniformBuffer::new(Vec::<u8>::new());
+    // Writing to a Vec fails only if it cannot grow, which aborts.
+    let _ = bytes.write(value);
+    bytes.into_inner()
+}
+
+fn storage_bytes<T: ShaderType + encase::ShaderSize + encase::internal::WriteInto>(values: &[T]) -> Vec<u8> {
+    let mut bytes = StorageBuffer::new(Vec::<u8>::new());
+    let _ = bytes.write(&values);
+    bytes.into_inner()
+}

@@ -1,0 +1,12 @@
+//! Scenes as they are loaded: conventions, hostile files, RON wrappers, animation, built-in scenes.
+#![allow(clippy::unwrap_used)]
+
+mod animation;
+mod area_lights;
+mod builtin;
+mod conventions;
+mod fuzz;
+mod glb;
+mod hostile;
+mod ron;
+mod shared;

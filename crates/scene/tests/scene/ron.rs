@@ -1,0 +1,178 @@
+//! RON scenes.
+
+use crate::glb::{Glb, folder, load_in};
+use glam::{DVec3, Vec3};
+use lobelia_scene::{LightKind, Ndf, Scene, SceneError};
+use serde_json::json;
+
+fn load(text: &str) -> Result<Scene, SceneError> {
+    let glb = Glb::triangle().bytes();
+    let mut pixels = std::io::Cursor::new(Vec::new());
+    image::Rgb32FImage::from_raw(2, 1, vec![1.0, 2.0, 3.0, 4.0, 5.0, 60_000.0])
+        .unwrap()
+        .write_to(&mut pixels, image::ImageFormat::OpenExr)
+        .unwrap();
+    let mut negative = std::io::Cursor::new(Vec::new());
+    image::Rgb32FImage::from_raw(1, 1, vec![1.0, -2.0, 3.0]).unwrap().write_to(&mut negative, image::ImageFormat::OpenExr).unwrap();
+    let files: [(&str, &[u8]); 4] =
+        [("scene.ron", text.as_bytes()), ("triangle.glb", &glb), ("sky.exr", pixels.get_ref()), ("negative.exr", negative.get_ref())];
+    load_in(&folder(&files), "scene.ron")
+}
+
+/// Asserts where and with what words a file is refused.
+#[track_caller]
+fn refused(text: &str, line: usize, column: usize, expected: &str) {
+    let error = load(text).expect_err("it should be refused");
+    let shown = error.to_string();
+    assert!(shown.contains(expected), "`{expected}` is not in: {shown}");
+    let SceneError::Ron { line: at_line, column: at_column, .. } = error else { panic!("no position: {shown}") };
+    assert_eq!((at_line, at_column), (line, column), "{shown}");
+    assert!(shown.contains(&format!("scene.ron:{line}:{column}: ")), "{shown}");
+}
+
+#[test]
+fn everything_can_be_added_or_overridden() {
+    let scene = load(
+        r#"(
+            gltf: "builtin:cornell-glossy", // a comment
+            ndf: phong,
+            environment: (file: "sky.exr", scale: 0.25),
+            cameras: {
+                "close": (origin: (0, 1, 3), target: (0, 1, 0), yfov: 0.5),
+                "side": (origin: (3, 1, 0), target: (0, 1, 0), up: (0, 0, 1), near: 0.5),
+            },
+            lights: {
+                "spot": spot(position: (0, 1.9, 0), direction: (0, -2, 0), intensity: (1, 2, 3), inner: 0.1, outer: 0.4),
+                "bulb": point(position: (0, 1, 0), intensity: (4, 4, 4)),
+                "sun": directional(direction: (1, 0, 0), illuminance: (5, 5, 5)),
+            },
+            materials: {
+                "*": (specular: 0.5, roughness: 0.6),
+                "tall-box": (roughness: 0.2, base_color: (0.1, 0.2, 0.3), metallic: 0.25, emissive: (7, 0, 0)),
+            },
+        )"#,
+    )
+    .unwrap();
+    assert_eq!(scene.ndf, Ndf::Phong);
+    let environment = scene.environment.as_ref().unwrap();
+    assert_eq!((environment.scale, environment.pixels.as_slice()), (0.25, &[Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 60_000.0)][..]));
+    let cameras: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
+    assert_eq!(cameras, ["close", "side", "main", "low"]);
+    let close = scene.camera(None).unwrap();
+    assert_eq!((close.name.as_str(), close.position, close.forward), ("close", DVec3::new(0.0, 1.0, 3.0), DVec3::NEG_Z));
+    assert_eq!((close.yfov, close.right), (0.5, DVec3::X));
+    // A thousandth of the diagonal of a 2 m box.
+    assert!((close.near - 12f64.sqrt() * 1e-3).abs() < 1e-9);
+    let side = scene.camera(Some("side")).unwrap();
+    assert_eq!((side.near, side.forward, side.up), (0.5, DVec3::NEG_X, DVec3::Z));
+    let lights: Vec<&str> = scene.lights.iter().map(|light| light.name.as_str()).collect();
+    assert_eq!(lights, ["spot", "bulb", "sun"]);
+    assert_eq!((scene.lights[0].direction, scene.lights[0].kind), (DVec3::NEG_Y, LightKind::Spot { inner: 0.1, outer: 0.4 }));
+    assert_eq!((scene.lights[2].kind, scene.lights[2].intensity), (LightKind::Directional, Vec3::splat(5.0)));
+    let of = |name: &str| scene.materials.iter().find(|material| material.name == name).unwrap();
+    assert_eq!((of("white").specular, of("white").roughness), (0.5, 0.6));
+    let tall = of("tall-box");
+    assert_eq!((tall.roughness, tall.metallic, tall.base_color), (0.2, 0.25, Vec3::new(0.1, 0.2, 0.3)));
+    assert_eq!((tall.specular, tall.emissive), (0.5, Vec3::new(7.0, 0.0, 0.0)));
+    let traits = scene.traits();
+    assert!(traits.environment && traits.emissive && traits.ndf == Ndf::Phong);
+}
+
+#[test]
+fn little_is_needed() {
+    let scene = load("(gltf: \"triangle.glb\")").unwrap();
+    assert_eq!((scene.triangles().len(), scene.ndf), (1, Ndf::Ggx));
+    assert!(scene.name.ends_with("scene.ron"));
+}
+
+#[test]
+fn lights_of_the_file_can_be_dropped_with_their_surfaces() {
+    let mut glb = Glb::triangle();
+    let bulb = glb.light(json!({"type": "point"}));
+    glb.node(json!({"extensions": {"KHR_lights_punctual": {"light": bulb}}}));
+    glb.node(json!({"name": "lamp", "extras": {"area_light": {"shape": "sphere", "radius": 1, "radiance": [1, 1, 1]}}}));
+    let load = |rest: &str| {
+        let text = format!("(gltf: \"lit.glb\", {rest})");
+        load_in(&folder(&[("scene.ron", text.as_bytes()), ("lit.glb", &glb.bytes())]), "scene.ron").unwrap()
+    };
+    let kept = load("");
+    assert_eq!((kept.lights.len(), kept.area_lights.len(), kept.instances.len()), (1, 1, 2));
+    let dropped = load("keep_lights: false, lights: {\"new\": point(position: (0, 0, 1), intensity: (1, 1, 1))}");
+    assert_eq!((dropped.lights.len(), dropped.area_lights.len(), dropped.instances.len()), (1, 0, 1));
+    assert_eq!(dropped.lights[0].name, "new");
+    // `*` is not the black surface of a light.
+    let rough = load("materials: {\"*\": (specular: 1.0, emissive: (0, 0, 0))}");
+    let surface = rough.instances.iter().find(|instance| instance.area_light.is_some()).unwrap();
+    let material = &rough.materials[rough.meshes[surface.mesh].material];
+    assert_eq!((material.specular, material.emissive), (0.0, Vec3::ONE));
+}
+
+#[test]
+fn normal_maps_can_be_switched_off() {
+    let mut glb = Glb::square(json!({"name": "wall", "normalTexture": {"index": 0}}));
+    glb.texture(&crate::glb::png(1, 1, &[128, 128, 255, 255]), json!({}));
+    for (on, expected) in [("true", true), ("false", false)] {
+        let text = format!("(gltf: \"square.glb\", materials: {{\"wall\": (normal_map: {on})}})");
+        let scene = load_in(&folder(&[("scene.ron", text.as_bytes()), ("square.glb", &glb.bytes())]), "scene.ron").unwrap();
+        assert_eq!(scene.traits().normal_maps, expected);
+    }
+}
+
+#[test]
+fn syntax_and_spelling() {
+    refused("", 1, 1, "");
+    refused("(\n  gltf: \"triangle.glb\",\n  ndf: gxg,\n)", 3, 8, "gxg");
+    refused("(\n  gltf: \"triangle.glb\",\n  enviroment: (file: \"sky.exr\"),\n)", 3, 3, "did you mean `environment`?");
+    refused("(\n  gltf: \"triangle.glb\",\n  materials: {\"*\": (roughnes: 0.1)},\n)", 3, 21, "did you mean `roughness`?");
+    refused("(\n  gltf: \"triangle.glb\",\n  lights: {\"a\": sport(outer: 1)},\n)", 3, 17, "did you mean `spot`?");
+    refused("(ndf: ggx)", 1, 10, "gltf");
+    refused("(gltf: \"triangle.glb\", keep_lights: 3)", 1, 36, "bool");
+    refused("(gltf: \"triangle.glb\",\n cameras: {\"a\": (origin: (0, 0), target: (0, 0, 0))})", 2, 31, "Expected a tuple of size 3");
+    refused("(gltf: \"triangle.glb\",\n materials: {\"*\": (), \"*\": ()})", 2, 24, "duplicate name `*`");
+}
+
+#[test]
+fn values_out_of_range() {
+    let with = |rest: &str| format!("(\n  gltf: \"triangle.glb\", // roughness: in a comment\n  {rest}\n)");
+    for (rest, column, expected) in [
+        ("materials: {\"default\": (metallic: 0, roughness: 1.5)},", 40, "material `default`: roughness is 1.5, but must lie in [0, 1]"),
+        ("materials: {\"default\": (specular: NaN)},", 27, "specular is NaN"),
+        ("materials: {\"default\": (base_color: (0, 2, 0))},", 27, "base_color is 2"),
+        ("materials: {\"default\": (emissive: (0, -2, 0))},", 27, "emissive is [0, -2, 0]"),
+        ("materials: {\"defualt\": ()},", 15, "no material is called `defualt`\n  help: did you mean `default`?"),
+        ("lights: {\"a\": point(position: (0, inf, 0), intensity: (1, 1, 1))},", 23, "light `a`: position is [0, inf, 0]"),
+        ("lights: {\"a\": point(position: (0, 0, 0), intensity: (-1, 1, 1))},", 12, "light `a`: its intensity is [-1, 1, 1]"),
+        ("lights: {\"a\": point(position: (0, 0, 0), intensity: (1e60, 1, 1))},", 12, "must be finite"),
+        ("lights: {\"a\": directional(direction: (0, 0, 0), illuminance: (1, 1, 1))},", 29, "direction is zero"),
+        (
+            "lights: {\"a\": spot(position: (0, 0, 0), direction: (0, 1, 0), intensity: (1, 1, 1), outer: 2)},",
+            12,
+            "its cone angles are 0 and 2",
+        ),
+        ("cameras: {\"a\": (origin: (0, 0, 1), target: (0, 0, 0), yfov: 4)},", 57, "camera `a`: yfov is 4, but must lie in (0, pi)"),
+        ("cameras: {\"a\": (origin: (0, 0, 1), target: (0, 0, 0), near: 0)},", 57, "near is 0, but must be positive"),
+        ("cameras: {\"a\": (origin: (0, 0, 1), target: (0, 0, 1))},", 38, "target must differ from origin"),
+        ("cameras: {\"a\": (origin: (0, 2, 0), target: (0, 0, 0))},", 38, "not lie along up"),
+        ("cameras: {\"a\": (origin: (0, NaN, 0), target: (0, 0, 0))},", 19, "origin is [0, NaN, 0], but must be finite"),
+        ("cameras: {\"a\": (origin: (0, 0, 1), target: (0, 0, 0), up: (0, 0, 0))},", 57, "up is zero"),
+        ("environment: (file: \"nowhere.hdr\"),", 17, "nowhere.hdr: cannot be read"),
+        ("environment: (file: \"triangle.glb\"),", 17, "triangle.glb: cannot be"),
+        ("environment: (file: \"negative.exr\"),", 17, "pixel (0, 0) is [1, -2, 3], but radiance must be finite and not negative"),
+        ("environment: (file: \"sky.exr\", scale: -1),", 34, "environment: scale is -1"),
+    ] {
+        refused(&with(rest), 3, column, expected);
+    }
+}
+
+#[test]
+fn wrapped_files() {
+    refused("(gltf: \"other.ron\")", 1, 2, "not another RON scene");
+    for (text, expected) in [
+        ("(gltf: \"nowhere.glb\")", "nowhere.glb: cannot be read"),
+        ("(gltf: \"builtin:sphere\")", "did you mean `spheres`?"),
+        ("(gltf: \"triangle.glb\", cameras: {\"a\": (origin: (0, 1e12, 1), target: (0, 0, 0))})", "camera `a` is at [0, 1000000000000, 1]"),
+    ] {
+        let error = load(text).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+}
