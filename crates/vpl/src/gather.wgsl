@@ -8,7 +8,7 @@
 #import lobelia::math::{safe_normalize, storable}
 #import lobelia::scene::{View, scene_position, view_depth}
 #import lobelia::surface::{PackedSurface, Surface, unpack_surface}
-#import lobelia::virtual_lights::{VirtualLight, virtual_light_normal, virtual_light_surface}
+#import lobelia::virtual_lights::{VirtualLight, virtual_light_surface}
 
 struct Settings {
     light_count: u32,
@@ -104,7 +104,8 @@ fn contribution(slot: u32, position: vec3f, surface: Surface, brdf: Brdf, to_vie
     let geometry = min(cosines / distance_squared, settings.clamp);
     let emitted = evaluate_brdf(shared_lights[slot].brdf, shared_lights[slot].normal, shared_lights[slot].geometric_normal, shared_lights[slot].to_source, -direction);
     let reflected = evaluate_brdf(brdf, surface.normal, surface.geometric_normal, direction, to_viewer);
-    return min(shared_lights[slot].flux * emitted * reflected * geometry, vec3f(1e30));
+    // Both factors are bounded, so that their product stays finite: infinity times a black channel would be NaN.
+    return min(shared_lights[slot].flux * min(emitted, vec3f(1e14)) * geometry, vec3f(1e20)) * min(reflected, vec3f(1e14));
 }
 
 @compute @workgroup_size(8, 8)

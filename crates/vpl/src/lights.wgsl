@@ -4,9 +4,9 @@
 // totals, and `pick` inverts both by binary search with a point of a low-discrepancy sequence.
 
 #import lobelia::brdf::{albedo_estimate, brdf_from_surface}
-#import lobelia::math::{luminance, safe_normalize}
+#import lobelia::math::luminance
 #import lobelia::octahedral::octahedral_pack
-#import lobelia::reflective_shadow_map::{RsmFace, rsm_direction_to_light, rsm_distance, rsm_flux, rsm_position, rsm_ray, rsm_ray_origin}
+#import lobelia::reflective_shadow_map::{RsmFace, rsm_direction_to_light, rsm_distance, rsm_flux, rsm_position}
 #import lobelia::sampling::r2_point
 #import lobelia::scene::PunctualLight
 #import lobelia::surface::{PackedSurface, unpack_surface}
@@ -72,8 +72,8 @@ fn importance(texel: vec2u, face_index: u32) -> f32 {
     return luminance(flux * albedo);
 }
 
-// Turns one value per invocation into running sums across the workgroup.
-fn scan(local: u32, value: f32) -> f32 {
+// Sum of the values of all invocations before this one.
+fn sum_before(local: u32, value: f32) -> f32 {
     partial[local] = value;
     workgroupBarrier();
     for (var step = 1u; step < 256u; step *= 2u) {
@@ -85,7 +85,7 @@ fn scan(local: u32, value: f32) -> f32 {
         partial[local] += before;
         workgroupBarrier();
     }
-    return partial[local];
+    return select(0.0, partial[max(local, 1u) - 1u], local > 0u);
 }
 
 @compute @workgroup_size(256)
@@ -99,7 +99,7 @@ fn sum_rows(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index
         sum += importance(vec2u(x, group.x), group.y);
         row_sums[row * settings.resolution + x] = sum;
     }
-    let before = scan(local, sum) - sum;
+    let before = sum_before(local, sum);
     for (var x = first; x < last; x++) {
         row_sums[row * settings.resolution + x] += before;
     }
@@ -119,7 +119,7 @@ fn sum_totals(@builtin(local_invocation_index) local: u32) {
         sum += total_sums[row];
         total_sums[row] = sum;
     }
-    let before = scan(local, sum) - sum;
+    let before = sum_before(local, sum);
     for (var row = first; row < last; row++) {
         total_sums[row] += before;
     }
@@ -187,18 +187,12 @@ fn pick(@builtin(global_invocation_id) id: vec3u) {
     let uv = texel_uv(texel);
     let packed = packed_texel(texel, face_index);
     let surface = unpack_surface(packed);
-    // A place within the texel, on the texel's plane, so that lights do not stand on a grid.
-    let inside = r2_point(id.x, settings.seed ^ 0x5bd1e995u) - vec2f(0.5);
-    let moved_uv = uv + inside / f32(settings.resolution);
-    let centre = rsm_position(face, uv, depth);
-    let ray = rsm_ray(face, moved_uv);
-    let origin = rsm_ray_origin(face, moved_uv);
-    let descent = dot(ray, surface.geometric_normal);
-    let distance = rsm_distance(face, depth);
-    let met = dot(centre - origin, surface.geometric_normal) / descent;
-    let stays = abs(descent) > 0.02 * length(ray) && abs(met - distance) < 0.02 * distance;
-    light.position = origin + ray * select(distance, met, stays);
-    light.flux = rsm_flux(face, source, uv, f32(settings.resolution)) * (total / (f32(settings.count) * weight));
+    // The texel's centre. A place spread over the texel's plane would look less regular, but at the edges of the scene half of such places lie behind
+    // the next wall, where no pixel sees them. The lift is the precision to which rasterisers place triangles, 1/256 of a texel: no light may start
+    // below its own surface.
+    let footprint = 2.0 * length(face.right) / f32(settings.resolution) * select(rsm_distance(face, depth), 1.0, face.depth_range != 0.0);
+    light.position = rsm_position(face, uv, depth) + surface.geometric_normal * (footprint / 256.0);
+    light.flux = min(rsm_flux(face, source, uv, f32(settings.resolution)) * (total / (f32(settings.count) * weight)), vec3f(1e24));
     light.geometric_normal = octahedral_pack(surface.geometric_normal);
     light.direction_to_source = rsm_direction_to_light(face, light.position);
 #ifdef SPECULAR
