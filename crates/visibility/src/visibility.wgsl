@@ -87,7 +87,6 @@ fn trace(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_ind
         if index < settings.light_count {
             entry.normal = virtual_light_normal(virtual_lights[index]);
             let position = virtual_lights[index].position;
-            // Lights lie on the plane of a texel of the shadow map, a little off the true surface.
             entry.position = offset_ray_origin(position, entry.normal, 32.0 * max(max(abs(position.x), abs(position.y)), abs(position.z)));
         }
         shared_lights[local] = entry;
@@ -102,7 +101,9 @@ fn trace(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_ind
         let normal = receiver_normal(place.pixel);
         let distance = view_depth(view, depth);
         let surface = scene_position(view, vec2f(place.pixel), depth);
-        let start = offset_ray_origin(surface, normal, 32.0 * distance);
+        // Rasterisers place triangles to 1/256 of a pixel: as far off its surface may the point be.
+        let footprint = 2.0 * length(view.up) / view.extent.y * distance;
+        let start = offset_ray_origin(surface + normal * (footprint / 256.0), normal, 32.0 * distance);
         for (var slot = 0u; slot < 32u; slot++) {
             let light_normal = shared_lights[slot].normal;
             let offset = shared_lights[slot].position - start;
