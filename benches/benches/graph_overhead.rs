@@ -8,8 +8,8 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use lobelia::{
     frame::{ImageShape, Radiance, SceneWorld},
     graph::{
-        BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, Gpu, GraphFile, InputShapes, NoParams, NoPorts, OutputShapes, Pass, PlanContext,
-        PlanOptions, PortError, Ports, RunError, RunOptions, Runner, testing,
+        BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, Gpu, GraphFile, InputShapes, NoParams, NoPorts, OutputShapes, Pass,
+        PlanContext, PlanOptions, PortError, Ports, RunError, RunOptions, Runner, testing,
     },
     scene::{Scene, device::GpuScene},
     shaders::{Flags, Source},
@@ -152,7 +152,11 @@ impl ByHand {
                 .enumerate()
                 .map(|(binding, view)| wgpu::BindGroupEntry { binding: binding as u32, resource: wgpu::BindingResource::TextureView(view) })
                 .collect();
-            device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &pipeline.get_bind_group_layout(0), entries: &entries })
+            device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: None,
+                layout: &pipeline.get_bind_group_layout(0),
+                entries: &entries,
+            })
         };
         let mut steps = vec![(make.raw().clone(), group(make.raw(), &[&views[0]]), "p0".to_owned())];
         for index in 1..PASSES {

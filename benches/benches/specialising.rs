@@ -5,7 +5,10 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use lobelia::{
     frame::SceneWorld,
     graph::{GraphFile, PlanOptions, RunOptions, Runner, testing},
-    scene::{Scene, device::{GpuScene, ViewUniform}},
+    scene::{
+        Scene,
+        device::{GpuScene, ViewUniform},
+    },
 };
 use std::{
     path::Path,

@@ -107,12 +107,19 @@ impl Composer {
     /// The module whose name shares the longest beginning or end with `name`.
     fn nearest(&self, name: &str) -> Option<&str> {
         let likeness = |candidate: &str| {
-            let same = |left: &mut dyn Iterator<Item = char>, right: &mut dyn Iterator<Item = char>| left.zip(right).take_while(|(l, r)| l == r).count();
+            let same = |left: &mut dyn Iterator<Item = char>, right: &mut dyn Iterator<Item = char>| {
+                left.zip(right).take_while(|(l, r)| l == r).count()
+            };
             let last = candidate.rsplit("::").next().unwrap_or(candidate);
             let wanted = name.rsplit("::").next().unwrap_or(name);
             same(&mut last.chars(), &mut wanted.chars()).max(same(&mut last.chars().rev(), &mut wanted.chars().rev()))
         };
-        self.names.iter().map(|candidate| (likeness(candidate), candidate.as_str())).filter(|(score, _)| *score > 1).max().map(|(_, name)| name)
+        self.names
+            .iter()
+            .map(|candidate| (likeness(candidate), candidate.as_str()))
+            .filter(|(score, _)| *score > 1)
+            .max()
+            .map(|(_, name)| name)
     }
 }
 

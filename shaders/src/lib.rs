@@ -31,5 +31,21 @@ macro_rules! modules {
 
 /// Every module of the library, each after the ones it imports.
 pub fn modules() -> &'static [Source<'static>] {
-    modules!["math", "octahedral", "packing", "scene", "light", "surface", "brdf", "sampling", "tonemap", "ray", "raster", "reflective_shadow_map", "virtual_lights", "light_visibility", "intersect"]
+    modules![
+        "math",
+        "octahedral",
+        "packing",
+        "scene",
+        "light",
+        "surface",
+        "brdf",
+        "sampling",
+        "tonemap",
+        "ray",
+        "raster",
+        "reflective_shadow_map",
+        "virtual_lights",
+        "light_visibility",
+        "intersect"
+    ]
 }

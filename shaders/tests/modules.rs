@@ -67,7 +67,9 @@ fn errors_say_where() {
     assert!(syntax.starts_with("crates/a/src/entry.wgsl:3:13:"), "{syntax}");
     let import = refused("#import lobelia::lumin::luminance\n@compute @workgroup_size(1) fn main() { let x = luminance(vec3f(1.0)); }\n");
     assert!(import.contains("lobelia::lumin"), "{import}");
-    let near = refused("#import lobelia::octahedra::octahedral_pack\n@compute @workgroup_size(1) fn main() { let a = octahedral_pack(vec3f(1.0)); }\n");
+    let near = refused(
+        "#import lobelia::octahedra::octahedral_pack\n@compute @workgroup_size(1) fn main() { let a = octahedral_pack(vec3f(1.0)); }\n",
+    );
     assert!(near.contains("did you mean `lobelia::octahedral`?"), "{near}");
     let unknown = refused("@compute @workgroup_size(1)\nfn main() {\n    let x = nothing_here(1.0);\n}\n");
     assert!(unknown.starts_with("crates/a/src/entry.wgsl:3:"), "{unknown}");

@@ -2,7 +2,8 @@
 
 use lobelia_frame::{ImageShape, Radiance, SceneWorld};
 use lobelia_graph::{
-    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, NoParams, OutputShapes, Pass, PlanContext, PortError, Ports, RunError,
+    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, NoParams, OutputShapes, Pass, PlanContext, PortError, Ports,
+    RunError,
 };
 use lobelia_shaders::Source;
 
@@ -45,7 +46,8 @@ impl Pass for ComposePass {
     fn shape(context: &PlanContext<'_, Self>, inputs: &InputShapes<Self>) -> Result<OutputShapes<Self>, PortError> {
         let extent = inputs.terms.first().map_or(context.extent, |first| first.extent);
         if let Some(other) = inputs.terms.iter().find(|term| term.extent != extent) {
-            let message = format!("its terms differ in size: {} x {} and {} x {} pixels", extent[0], extent[1], other.extent[0], other.extent[1]);
+            let message =
+                format!("its terms differ in size: {} x {} and {} x {} pixels", extent[0], extent[1], other.extent[0], other.extent[1]);
             return Err(PortError::at("terms", message));
         }
         if inputs.terms.len() > TERMS.len() {

@@ -2,8 +2,8 @@
 
 use lobelia_frame::{DisplayImage, ImageShape, Radiance, SceneWorld};
 use lobelia_graph::{
-    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, OutputShapes, ParamValue, Params, Pass, PlanContext, PortError, Ports,
-    RunError,
+    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, OutputShapes, ParamValue, Params, Pass, PlanContext,
+    PortError, Ports, RunError,
 };
 use lobelia_shaders::Source;
 use serde::{Deserialize, Serialize};

@@ -23,8 +23,18 @@ impl SurfaceFlags {
     pub fn specialisations(self) -> Vec<Specialisation> {
         let flag = |name, on: bool, some: &str, none: &str| Specialisation::new(name, on, if on { some } else { none });
         vec![
-            flag("SPECULAR", self.specular, "a material has a specular lobe", "no material has a specular lobe: roughness target and lobe dropped"),
-            flag("NORMAL_MAP", self.normal_map, "a material has a normal map", "no material has a normal map: geometric-normal target dropped"),
+            flag(
+                "SPECULAR",
+                self.specular,
+                "a material has a specular lobe",
+                "no material has a specular lobe: roughness target and lobe dropped",
+            ),
+            flag(
+                "NORMAL_MAP",
+                self.normal_map,
+                "a material has a normal map",
+                "no material has a normal map: geometric-normal target dropped",
+            ),
             flag("EMISSIVE", self.emissive, "a material emits", "no material emits: emission target dropped"),
         ]
     }
@@ -81,10 +91,7 @@ pub(crate) fn surface_parts(extent: [u32; 2], layers: u32, flags: SurfaceFlags, 
         let part = Part::layered_texture(name, format, extent, layers, usage);
         if array { part.always_array() } else { part }
     };
-    let mut parts = vec![
-        texture("depth", SurfaceFormats::DEPTH).values(Values::NonNegative),
-        texture("core", SurfaceFormats::CORE),
-    ];
+    let mut parts = vec![texture("depth", SurfaceFormats::DEPTH).values(Values::NonNegative), texture("core", SurfaceFormats::CORE)];
     if flags.specular {
         parts.push(texture("specular", SurfaceFormats::SPECULAR));
     }
@@ -99,7 +106,8 @@ pub(crate) fn surface_parts(extent: [u32; 2], layers: u32, flags: SurfaceFlags, 
 
 impl Resource for GBuffer {
     const NAME: &'static str = "GBuffer";
-    const DOC: &'static str = "The surface nearest to the camera at every pixel: depth, normals, base colour, roughness, metallic, emission.";
+    const DOC: &'static str =
+        "The surface nearest to the camera at every pixel: depth, normals, base colour, roughness, metallic, emission.";
     type Shape = GBufferShape;
 
     fn parts(shape: &GBufferShape) -> Vec<Part> {

@@ -112,12 +112,12 @@ impl LightVisibilityShape {
 }
 
 const CHUNK_NAMES: [&str; 64] = [
-    "chunk_0", "chunk_1", "chunk_2", "chunk_3", "chunk_4", "chunk_5", "chunk_6", "chunk_7", "chunk_8", "chunk_9", "chunk_10", "chunk_11", "chunk_12",
-    "chunk_13", "chunk_14", "chunk_15", "chunk_16", "chunk_17", "chunk_18", "chunk_19", "chunk_20", "chunk_21", "chunk_22", "chunk_23", "chunk_24",
-    "chunk_25", "chunk_26", "chunk_27", "chunk_28", "chunk_29", "chunk_30", "chunk_31", "chunk_32", "chunk_33", "chunk_34", "chunk_35", "chunk_36",
-    "chunk_37", "chunk_38", "chunk_39", "chunk_40", "chunk_41", "chunk_42", "chunk_43", "chunk_44", "chunk_45", "chunk_46", "chunk_47", "chunk_48",
-    "chunk_49", "chunk_50", "chunk_51", "chunk_52", "chunk_53", "chunk_54", "chunk_55", "chunk_56", "chunk_57", "chunk_58", "chunk_59", "chunk_60",
-    "chunk_61", "chunk_62", "chunk_63",
+    "chunk_0", "chunk_1", "chunk_2", "chunk_3", "chunk_4", "chunk_5", "chunk_6", "chunk_7", "chunk_8", "chunk_9", "chunk_10", "chunk_11",
+    "chunk_12", "chunk_13", "chunk_14", "chunk_15", "chunk_16", "chunk_17", "chunk_18", "chunk_19", "chunk_20", "chunk_21", "chunk_22",
+    "chunk_23", "chunk_24", "chunk_25", "chunk_26", "chunk_27", "chunk_28", "chunk_29", "chunk_30", "chunk_31", "chunk_32", "chunk_33",
+    "chunk_34", "chunk_35", "chunk_36", "chunk_37", "chunk_38", "chunk_39", "chunk_40", "chunk_41", "chunk_42", "chunk_43", "chunk_44",
+    "chunk_45", "chunk_46", "chunk_47", "chunk_48", "chunk_49", "chunk_50", "chunk_51", "chunk_52", "chunk_53", "chunk_54", "chunk_55",
+    "chunk_56", "chunk_57", "chunk_58", "chunk_59", "chunk_60", "chunk_61", "chunk_62", "chunk_63",
 ];
 
 /// Which virtual lights each pixel's surface sees: one bit per pixel and light, 1 = visible.

@@ -63,7 +63,8 @@ pub struct ReflectiveShadowMap {
 
 impl Resource for ReflectiveShadowMap {
     const NAME: &'static str = "ReflectiveShadowMap";
-    const DOC: &'static str = "What each punctual light sees: depth, normals, material and reflected flux (W) per texel; also its shadow map.";
+    const DOC: &'static str =
+        "What each punctual light sees: depth, normals, material and reflected flux (W) per texel; also its shadow map.";
     type Shape = ReflectiveShadowMapShape;
 
     fn parts(shape: &ReflectiveShadowMapShape) -> Vec<Part> {

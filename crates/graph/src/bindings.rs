@@ -110,11 +110,12 @@ impl<'a> Bindings<'a> {
         let reflection = &self.reflection;
         let mut entries = Vec::new();
         for given in &self.given {
-            let declared = reflection.bindings.iter().find(|declared| declared.name == given.name).ok_or_else(|| BuildError::UnknownBinding {
-                shader: reflection.shader.clone(),
-                name: given.name.to_owned(),
-                nearest: nearest(given.name, reflection.bindings.iter().map(|declared| declared.name.as_str())).map(str::to_owned),
-            })?;
+            let declared =
+                reflection.bindings.iter().find(|declared| declared.name == given.name).ok_or_else(|| BuildError::UnknownBinding {
+                    shader: reflection.shader.clone(),
+                    name: given.name.to_owned(),
+                    nearest: nearest(given.name, reflection.bindings.iter().map(|declared| declared.name.as_str())).map(str::to_owned),
+                })?;
             if let (Some(kind), true) = (declared.kind, declared.group == self.group) {
                 self.check(declared, kind, given)?;
                 let resource = match given.value {
@@ -139,7 +140,8 @@ impl<'a> Bindings<'a> {
         let Some(layout) = reflection.layouts.get(&self.group) else {
             return Err(BuildError::Other(format!("shader `{}` has no bind group {}", reflection.shader, self.group)));
         };
-        let group = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor { label: Some(&reflection.shader), layout, entries: &entries });
+        let group =
+            gpu.device().create_bind_group(&wgpu::BindGroupDescriptor { label: Some(&reflection.shader), layout, entries: &entries });
         Ok(checked(gpu, group)?)
     }
 

@@ -83,7 +83,12 @@ impl Checker {
                             buffer: &self.poison,
                             layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(pitch), rows_per_image: Some(rows) },
                         },
-                        wgpu::TexelCopyTextureInfo { texture, mip_level: mip, origin: wgpu::Origin3d { x: 0, y, z: layer }, aspect: wgpu::TextureAspect::All },
+                        wgpu::TexelCopyTextureInfo {
+                            texture,
+                            mip_level: mip,
+                            origin: wgpu::Origin3d { x: 0, y, z: layer },
+                            aspect: wgpu::TextureAspect::All,
+                        },
                         wgpu::Extent3d { width, height: rows, depth_or_array_layers: 1 },
                     );
                 }
@@ -130,7 +135,12 @@ impl Checker {
                 for layer in 0..shape.layers {
                     let copy = self.scratch(gpu, u64::from(pitch) * u64::from(height));
                     encoder.copy_texture_to_buffer(
-                        wgpu::TexelCopyTextureInfo { texture: texture.texture(), mip_level: 0, origin: wgpu::Origin3d { x: 0, y: 0, z: layer }, aspect },
+                        wgpu::TexelCopyTextureInfo {
+                            texture: texture.texture(),
+                            mip_level: 0,
+                            origin: wgpu::Origin3d { x: 0, y: 0, z: layer },
+                            aspect,
+                        },
                         wgpu::TexelCopyBufferInfo {
                             buffer: &copy,
                             layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(pitch), rows_per_image: Some(height) },

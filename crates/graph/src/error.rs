@@ -151,7 +151,9 @@ pub enum RunError {
         declared: String,
     },
     /// The safety net found numbers that must not be there.
-    #[error("pass `{pass}` ({kind}) wrote {non_finite} non-finite and {negative} negative values into `{resource}` in frame {frame}; it is the first to do so")]
+    #[error(
+        "pass `{pass}` ({kind}) wrote {non_finite} non-finite and {negative} negative values into `{resource}` in frame {frame}; it is the first to do so"
+    )]
     BadValues {
         /// Name in the file.
         pass: String,

@@ -165,7 +165,8 @@ impl<'a> Reader<'a> {
         for (index, (name, _)) in named.iter().enumerate() {
             if let Some((first, _)) = named[..index].iter().find(|(earlier, _)| earlier.text == name.text) {
                 self.problems.push(
-                    Problem::at(name.span.clone(), format!("duplicate {what} `{}`", name.text)).other(first.span.clone(), "first written here"),
+                    Problem::at(name.span.clone(), format!("duplicate {what} `{}`", name.text))
+                        .other(first.span.clone(), "first written here"),
                 );
             }
         }
@@ -204,7 +205,8 @@ impl<'a> Reader<'a> {
         for (port, value) in self.entries(value.trim().get_ron(), "port") {
             let text = value.trim().get_ron();
             let items: Vec<&'a str> = if text.starts_with('[') {
-                self.read::<Items<'a>>(text).map_or_else(Vec::new, |Items(items)| items.into_iter().map(|item| item.trim().get_ron()).collect())
+                self.read::<Items<'a>>(text)
+                    .map_or_else(Vec::new, |Items(items)| items.into_iter().map(|item| item.trim().get_ron()).collect())
             } else if text == "none" {
                 Vec::new()
             } else {
@@ -281,8 +283,11 @@ impl GraphFile {
                 other => {
                     let near = crate::registry::nearest(other, ["passes", "output", "variants"]);
                     reader.problems.push(
-                        Problem::at(name.span.clone(), format!("a graph has no section `{other}`; it has `passes`, `output` and `variants`"))
-                            .maybe_help(near.map(|near| format!("did you mean `{near}`?"))),
+                        Problem::at(
+                            name.span.clone(),
+                            format!("a graph has no section `{other}`; it has `passes`, `output` and `variants`"),
+                        )
+                        .maybe_help(near.map(|near| format!("did you mean `{near}`?"))),
                     );
                 }
             }

@@ -134,7 +134,8 @@ pub trait Pass: Sized + 'static {
     fn create(context: &CreateContext<'_, Self>) -> Result<Self, BuildError>;
 
     /// Creates bind groups.
-    fn bind(&self, context: &CreateContext<'_, Self>, inputs: &Self::Inputs, outputs: &Self::Outputs) -> Result<Self::Bindings, BuildError>;
+    fn bind(&self, context: &CreateContext<'_, Self>, inputs: &Self::Inputs, outputs: &Self::Outputs)
+    -> Result<Self::Bindings, BuildError>;
 
     /// Records one frame.
     fn record(&mut self, frame: &mut Frame<'_>, world: &DeviceOf<Self>, bindings: &Self::Bindings) -> Result<(), RunError>;

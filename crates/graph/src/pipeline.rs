@@ -169,7 +169,14 @@ impl Cache {
         Ok((key, shader))
     }
 
-    pub fn compute(&mut self, gpu: &Gpu, label: &str, source: Source<'_>, entry: &str, flags: &Flags) -> Result<ComputePipeline, BuildError> {
+    pub fn compute(
+        &mut self,
+        gpu: &Gpu,
+        label: &str,
+        source: Source<'_>,
+        entry: &str,
+        flags: &Flags,
+    ) -> Result<ComputePipeline, BuildError> {
         let clock = Instant::now();
         let (shader_key, shader) = self.shader(gpu, source, flags)?;
         let key = hash_of((shader_key, entry));
@@ -244,7 +251,13 @@ impl Cache {
         self.statistics.seconds += clock.elapsed().as_secs_f64();
     }
 
-    fn reflect(&mut self, gpu: &Gpu, shader: &Shader, entries: &[&str], given: &[(u32, wgpu::BindGroupLayout)]) -> Result<Reflection, BuildError> {
+    fn reflect(
+        &mut self,
+        gpu: &Gpu,
+        shader: &Shader,
+        entries: &[&str],
+        given: &[(u32, wgpu::BindGroupLayout)],
+    ) -> Result<Reflection, BuildError> {
         let bindings = reflect_bindings(shader, entries)?;
         let mut layouts: BTreeMap<u32, wgpu::BindGroupLayout> = given.iter().cloned().collect();
         let groups = bindings.iter().filter(|binding| binding.kind.is_some()).map(|binding| binding.group).max();
@@ -256,7 +269,12 @@ impl Cache {
                 .iter()
                 .filter(|binding| binding.group == group)
                 .filter_map(|binding| {
-                    Some(wgpu::BindGroupLayoutEntry { binding: binding.binding, visibility: binding.visibility, ty: binding.kind?, count: None })
+                    Some(wgpu::BindGroupLayoutEntry {
+                        binding: binding.binding,
+                        visibility: binding.visibility,
+                        ty: binding.kind?,
+                        count: None,
+                    })
                 })
                 .collect();
             found.sort_by_key(|entry| entry.binding);
@@ -279,7 +297,11 @@ impl Cache {
 
 fn pipeline_layout(gpu: &Gpu, label: &str, reflection: &Reflection) -> wgpu::PipelineLayout {
     let groups: Vec<Option<&wgpu::BindGroupLayout>> = reflection.layouts.values().map(Some).collect();
-    gpu.device().create_pipeline_layout(&wgpu::PipelineLayoutDescriptor { label: Some(label), bind_group_layouts: &groups, immediate_size: 0 })
+    gpu.device().create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(label),
+        bind_group_layouts: &groups,
+        immediate_size: 0,
+    })
 }
 
 fn reflect_bindings(shader: &Shader, entries: &[&str]) -> Result<Vec<DeclaredBinding>, BuildError> {
@@ -320,7 +342,8 @@ fn stage(stage: naga::ShaderStage) -> wgpu::ShaderStages {
 
 fn binding_type(module: &naga::Module, variable: &naga::GlobalVariable, filtered: bool) -> Result<wgpu::BindingType, BuildError> {
     use naga::{AddressSpace, ImageClass, ImageDimension, ScalarKind, TypeInner};
-    let unsupported = || BuildError::Other(format!("binding `{}` is of a kind that passes cannot bind", variable.name.as_deref().unwrap_or_default()));
+    let unsupported =
+        || BuildError::Other(format!("binding `{}` is of a kind that passes cannot bind", variable.name.as_deref().unwrap_or_default()));
     let inner = &module.types[variable.ty].inner;
     let size = || {
         let mut layouter = naga::proc::Layouter::default();

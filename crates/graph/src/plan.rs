@@ -13,7 +13,11 @@ use crate::{
 };
 use lobelia_shaders::Flags;
 use petgraph::visit::EdgeRef;
-use std::{collections::BTreeMap, hash::{DefaultHasher, Hash, Hasher}, sync::Arc};
+use std::{
+    collections::BTreeMap,
+    hash::{DefaultHasher, Hash, Hasher},
+    sync::Arc,
+};
 
 /// What a plan is made for, apart from the graph.
 #[derive(Clone, Debug)]
@@ -209,7 +213,15 @@ impl<W: World> Wired<W> {
         }
         let order = self.order();
         let pruning = self.prune(&traits, &roots, &order);
-        let mut planner = Planner { wired: self, options, traits: &traits, pruning: &pruning, passes: Vec::new(), resources: Vec::new(), made: BTreeMap::new() };
+        let mut planner = Planner {
+            wired: self,
+            options,
+            traits: &traits,
+            pruning: &pruning,
+            passes: Vec::new(),
+            resources: Vec::new(),
+            made: BTreeMap::new(),
+        };
         planner.shape_all(&order).map_err(|problems| self.file.fail(problems))?;
         let mut kept = Vec::new();
         for root in &roots {
@@ -225,7 +237,8 @@ impl<W: World> Wired<W> {
     /// Producers before consumers; where there is a choice, the order of the file.
     fn order(&self) -> Vec<usize> {
         let graph = dependency_graph(&self.passes);
-        let mut waiting: Vec<usize> = graph.node_indices().map(|node| graph.edges_directed(node, petgraph::Direction::Incoming).count()).collect();
+        let mut waiting: Vec<usize> =
+            graph.node_indices().map(|node| graph.edges_directed(node, petgraph::Direction::Incoming).count()).collect();
         let mut done = vec![false; self.passes.len()];
         let mut order = Vec::new();
         // Cycles were refused when the graph was wired, so there is always a pass that waits for nothing.
@@ -249,7 +262,8 @@ impl<W: World> Wired<W> {
                     let pass = &self.passes[port.pass];
                     let wanted = pass.kind.info().outputs[port.port].resource;
                     let inputs = pass.kind.info().inputs.iter().zip(&pass.sources);
-                    let source = inputs.filter(|(info, _)| info.resource == wanted && !info.history).flat_map(|(_, sources)| sources).next();
+                    let source =
+                        inputs.filter(|(info, _)| info.resource == wanted && !info.history).flat_map(|(_, sources)| sources).next();
                     port = *source?;
                 }
             }
@@ -403,7 +417,10 @@ impl<W: World> Planner<'_, W> {
             .collect();
         let values: Vec<PortValue> = inputs
             .iter()
-            .map(|resources| PortValue { shapes: resources.iter().map(|resource| self.resources[*resource].value()).collect(), parts: Vec::new() })
+            .map(|resources| PortValue {
+                shapes: resources.iter().map(|resource| self.resources[*resource].value()).collect(),
+                parts: Vec::new(),
+            })
             .collect();
         let shapes = wired.kind.shape(&context, &values).map_err(|error| {
             let port = error.port.map(|port| format!(", port `{port}`")).unwrap_or_default();
@@ -460,7 +477,11 @@ impl<W: World> Planner<'_, W> {
             };
             let what = format!("this scene does not make `{name}`: pass `{}` is left out because {reason}", pass.name);
             let help = "`lobelia explain` shows what is kept and what is dropped; choose another output or another scene";
-            if root == self.wired.output { Problem::at(self.wired.file.output.span.clone(), what).help(help) } else { Problem::on_command_line(what).help(help) }
+            if root == self.wired.output {
+                Problem::at(self.wired.file.output.span.clone(), what).help(help)
+            } else {
+                Problem::on_command_line(what).help(help)
+            }
         })
     }
 }
@@ -489,7 +510,8 @@ fn allocate<W: World>(passes: &[PlannedPass<W>], resources: &mut [PlannedResourc
             for _ in 0..sides {
                 for part in resource.parts.clone() {
                     let shared = reuse && !resource.history;
-                    let found = (0..slots.len()).find(|slot| shared && slots[*slot].kind == part.kind && free_after[*slot].is_some_and(|after| after < position));
+                    let found = (0..slots.len())
+                        .find(|slot| shared && slots[*slot].kind == part.kind && free_after[*slot].is_some_and(|after| after < position));
                     let slot = found.unwrap_or_else(|| {
                         slots.push(Slot { kind: part.kind.clone(), bytes: part.bytes(), users: Vec::new() });
                         free_after.push(None);

@@ -59,11 +59,7 @@ impl Part {
 
     /// A buffer of `bytes` (rounded up to a multiple of 16, at least 16).
     pub fn buffer(name: &'static str, bytes: u64, usage: wgpu::BufferUsages) -> Self {
-        Self {
-            name,
-            kind: PartKind::Buffer(BufferShape { bytes: bytes.max(1).next_multiple_of(16), usage }),
-            values: Values::Any,
-        }
+        Self { name, kind: PartKind::Buffer(BufferShape { bytes: bytes.max(1).next_multiple_of(16), usage }), values: Values::Any }
     }
 
     /// Makes the whole-texture view an array view even for a single layer.

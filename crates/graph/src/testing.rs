@@ -47,7 +47,12 @@ pub fn evaluate<I: bytemuck::Pod, O: bytemuck::Pod>(gpu: &Gpu, wgsl: &str, flags
     let mut outputs = Vec::with_capacity(inputs.len());
     for rows in inputs.chunks(ROWS) {
         let buffer = |size: usize, usage| {
-            gpu.device().create_buffer(&wgpu::BufferDescriptor { label: Some("table"), size: size as u64, usage, mapped_at_creation: false })
+            gpu.device().create_buffer(&wgpu::BufferDescriptor {
+                label: Some("table"),
+                size: size as u64,
+                usage,
+                mapped_at_creation: false,
+            })
         };
         let input = buffer(std::mem::size_of_val(rows), wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST);
         let output = buffer(rows.len() * size_of::<O>(), wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);

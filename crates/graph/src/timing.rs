@@ -2,10 +2,7 @@
 //!
 //! Timestamps inside a pass are never asked for: software drivers resolve them at the wrong moment.
 
-use crate::{
-    gpu::Gpu,
-    run::FrameReport,
-};
+use crate::{gpu::Gpu, run::FrameReport};
 use std::path::Path;
 use wgpu_profiler::{GpuProfiler, GpuProfilerQuery, GpuProfilerSettings, GpuTimerQueryResult};
 

@@ -31,7 +31,8 @@ impl std::str::FromStr for Override {
             let value = value.trim();
             (!pass.is_empty() && !param.is_empty() && !value.is_empty()).then(|| (pass.to_owned(), param.to_owned(), value.to_owned()))
         });
-        let (pass, param, value) = parsed.ok_or_else(|| format!("`{text}` is not of the form PASS.PARAM=VALUE, such as lights.count=1024"))?;
+        let (pass, param, value) =
+            parsed.ok_or_else(|| format!("`{text}` is not of the form PASS.PARAM=VALUE, such as lights.count=1024"))?;
         Ok(Self { pass, param, value })
     }
 }
@@ -90,7 +91,8 @@ impl GraphFile {
                 None => {
                     let near = nearest(wanted, self.variant_names()).map(|near| format!("did you mean `{near}`?"));
                     let all = self.variant_names().collect::<Vec<_>>().join(", ");
-                    let help = near.unwrap_or_else(|| if all.is_empty() { "the graph has no variants".into() } else { format!("it has {all}") });
+                    let help =
+                        near.unwrap_or_else(|| if all.is_empty() { "the graph has no variants".into() } else { format!("it has {all}") });
                     problems.push(Problem::on_command_line(format!("{}: no variant is called `{wanted}`", self.path)).help(help));
                 }
             }
@@ -125,8 +127,11 @@ impl GraphFile {
                 if !self.passes.iter().any(|pass| pass.name.text == name.text) {
                     let near = nearest(&name.text, self.passes.iter().map(|pass| pass.name.text.as_str()));
                     problems.push(
-                        Problem::at(name.span.clone(), format!("variant `{}` names no pass: the graph has no `{}` to replace", variant.text, name.text))
-                            .maybe_help(near.map(|near| format!("did you mean `{near}`?"))),
+                        Problem::at(
+                            name.span.clone(),
+                            format!("variant `{}` names no pass: the graph has no `{}` to replace", variant.text, name.text),
+                        )
+                        .maybe_help(near.map(|near| format!("did you mean `{near}`?"))),
                     );
                 }
             }
@@ -148,7 +153,12 @@ fn apply_variant(entries: &mut Vec<PassEntry>, replacements: &[Replacement]) {
 }
 
 /// Keeps the overrides that name a pass of the graph.
-fn check_override_names<'a>(path: &str, entries: &[PassEntry], overrides: &'a [Override], problems: &mut Vec<Problem>) -> Vec<&'a Override> {
+fn check_override_names<'a>(
+    path: &str,
+    entries: &[PassEntry],
+    overrides: &'a [Override],
+    problems: &mut Vec<Problem>,
+) -> Vec<&'a Override> {
     overrides
         .iter()
         .filter(|item| {
@@ -176,7 +186,8 @@ fn resolve_pass<W: World>(
         let near = registry.nearest(&entry.kind.text).map(|near| format!("did you mean `{}`?", near.replace('-', "_")));
         let help = near.unwrap_or_else(|| "`lobelia passes` lists them all".into());
         problems.push(
-            Problem::at(entry.kind.span.clone(), format!("pass `{}`: no kind of pass is called `{}`", entry.name.text, entry.kind.text)).help(help),
+            Problem::at(entry.kind.span.clone(), format!("pass `{}`: no kind of pass is called `{}`", entry.name.text, entry.kind.text))
+                .help(help),
         );
         return None;
     };
@@ -410,7 +421,8 @@ impl<W: World> Wiring<'_, W> {
     fn check_source(&mut self, pass: &str, port: &PortInfo, source: &Spanned) -> Option<PortRef> {
         match find_port(self.passes, &source.text) {
             Err(help) => {
-                let what = format!("pass `{pass}`, port `{}: {}`: there is no `{}` in this graph", port.name, port.resource.name, source.text);
+                let what =
+                    format!("pass `{pass}`, port `{}: {}`: there is no `{}` in this graph", port.name, port.resource.name, source.text);
                 self.problems.push(Problem::at(source.span.clone(), what).help(help));
                 None
             }
@@ -424,10 +436,8 @@ impl<W: World> Wiring<'_, W> {
                     [] => format!("no pass of this graph makes a {}", port.resource.name),
                     some => format!("{} made by {}", port.resource.name, self.list(some)),
                 };
-                let what = format!(
-                    "pass `{pass}`, port `{}`: expected {}, but `{}` is {}",
-                    port.name, port.resource.name, source.text, made.name
-                );
+                let what =
+                    format!("pass `{pass}`, port `{}`: expected {}, but `{}` is {}", port.name, port.resource.name, source.text, made.name);
                 self.problems.push(Problem::at(source.span.clone(), what).help(help));
                 None
             }
@@ -483,7 +493,8 @@ impl<W: World> Wiring<'_, W> {
             (Arity::List, _) | (_, 1) => self.passes[index].sources[port_index] = candidates,
             (Arity::Optional, 0) => {}
             (Arity::One, 0) => {
-                let kinds: Vec<_> = self.registry.infos().filter(|info| info.outputs.iter().any(|output| output.resource == port.resource)).collect();
+                let kinds: Vec<_> =
+                    self.registry.infos().filter(|info| info.outputs.iter().any(|output| output.resource == port.resource)).collect();
                 let help = match kinds.as_slice() {
                     [] => format!("no registered pass makes a {}", port.resource.name),
                     some => format!(
@@ -492,7 +503,9 @@ impl<W: World> Wiring<'_, W> {
                         some.iter().map(|info| info.name.replace('-', "_")).collect::<Vec<_>>().join(", ")
                     ),
                 };
-                self.problems.push(Problem::at(span, format!("{what} is not connected: nothing in this graph makes a {}", port.resource.name)).help(help));
+                self.problems.push(
+                    Problem::at(span, format!("{what} is not connected: nothing in this graph makes a {}", port.resource.name)).help(help),
+                );
             }
             (Arity::One | Arity::Optional, _) => {
                 let first = &self.passes[candidates[0].pass];
@@ -513,7 +526,11 @@ fn find_cycles<W: World>(passes: &[WiredPass<W>], problems: &mut Vec<Problem>) {
         let is_cycle = members.len() > 1 || graph.contains_edge(component[0], component[0]);
         if is_cycle {
             let names = members.iter().map(|index| format!("`{}`", passes[*index].name)).collect::<Vec<_>>().join(", ");
-            let what = if members.len() == 1 { format!("pass {names} reads its own output") } else { format!("passes {names} wait for each other in a cycle") };
+            let what = if members.len() == 1 {
+                format!("pass {names} reads its own output")
+            } else {
+                format!("passes {names} wait for each other in a cycle")
+            };
             let help = "break it with a `from` that names another producer, or read last frame's value through a history port";
             problems.push(Problem::at(passes[members[0]].span.clone(), what).help(help));
         }
@@ -535,4 +552,3 @@ pub(crate) fn dependency_graph<W: World>(passes: &[WiredPass<W>]) -> DiGraph<usi
     }
     graph
 }
-

@@ -84,7 +84,9 @@ fn tables_are_evaluated_and_a_wrong_twin_is_found() {
 #[test]
 fn the_comparator_rejects_what_it_must() {
     assert!(compare(&[1.0, 2.0], &[1.0, 2.0], 0.0, 1e-9).is_ok());
-    for (expected, got) in [(vec![1.0], vec![f64::NAN]), (vec![f64::NAN], vec![f64::NAN]), (vec![1.0], vec![]), (vec![], vec![]), (vec![1.0], vec![1.1])] {
+    for (expected, got) in
+        [(vec![1.0], vec![f64::NAN]), (vec![f64::NAN], vec![f64::NAN]), (vec![1.0], vec![]), (vec![], vec![]), (vec![1.0], vec![1.1])]
+    {
         assert!(compare(&expected, &got, 1e-3, 1e-3).is_err(), "{expected:?} {got:?}");
     }
 }
@@ -130,7 +132,9 @@ fn planted_values_in_textures_are_counted_and_poison_is_seen() {
     let Some(gpu) = gpu() else { return };
     let half = |value: f32| half::f16::from_f32(value).to_bits();
     // 5 texels wide: rows are padded in the copy, and the padding must not count.
-    for (format, texel) in [(wgpu::TextureFormat::Rgba16Float, 8usize), (wgpu::TextureFormat::Rgba32Float, 16), (wgpu::TextureFormat::R32Float, 4)] {
+    for (format, texel) in
+        [(wgpu::TextureFormat::Rgba16Float, 8usize), (wgpu::TextureFormat::Rgba32Float, 16), (wgpu::TextureFormat::R32Float, 4)]
+    {
         let part = Part::texture("image", format, [5, 3], wgpu::TextureUsages::STORAGE_BINDING).values(Values::NonNegative);
         let lobelia_graph::PartKind::Texture(shape) = &part.kind else { unreachable!() };
         let texture = gpu.device().create_texture(&wgpu::TextureDescriptor {
@@ -140,10 +144,18 @@ fn planted_values_in_textures_are_counted_and_poison_is_seen() {
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
             format,
-            usage: wgpu::TextureUsages::COPY_SRC | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::STORAGE_BINDING,
+            usage: wgpu::TextureUsages::COPY_SRC
+                | wgpu::TextureUsages::COPY_DST
+                | wgpu::TextureUsages::TEXTURE_BINDING
+                | wgpu::TextureUsages::STORAGE_BINDING,
             view_formats: &[],
         });
-        let handle = lobelia_graph::PartHandle::Texture(lobelia_graph::TexturePart::for_test(texture.clone(), shape.clone(), Access::Write, "planted"));
+        let handle = lobelia_graph::PartHandle::Texture(lobelia_graph::TexturePart::for_test(
+            texture.clone(),
+            shape.clone(),
+            Access::Write,
+            "planted",
+        ));
         let mut checker = Checker::new(gpu).unwrap();
         let mut count = |poison: bool| {
             let mut encoder = encoder(gpu);
@@ -168,7 +180,12 @@ fn planted_values_in_textures_are_counted_and_poison_is_seen() {
             _ => values.iter().flat_map(|value| value.to_le_bytes()).collect(),
         };
         let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(5 * texel as u32), rows_per_image: Some(3) };
-        gpu.queue().write_texture(texture.as_image_copy(), &bytes, layout, wgpu::Extent3d { width: 5, height: 3, depth_or_array_layers: 1 });
+        gpu.queue().write_texture(
+            texture.as_image_copy(),
+            &bytes,
+            layout,
+            wgpu::Extent3d { width: 5, height: 3, depth_or_array_layers: 1 },
+        );
         assert_eq!(count(false), (2, 2), "{format:?}");
         let back = gpu.read_texture(&texture, 0, 0).unwrap();
         assert_eq!(back.bytes, bytes, "{format:?} comes back as it went");

@@ -175,7 +175,9 @@ fn specialising_sets_flags_and_can_be_switched_off() {
 
 #[test]
 fn fingerprints_tell_plans_apart() {
-    let of = |variants: &[&str], sets: &[&str], extent| wire(BASE, variants, sets).unwrap().plan(&LIT, &PlanOptions::new(extent)).unwrap().fingerprint();
+    let of = |variants: &[&str], sets: &[&str], extent| {
+        wire(BASE, variants, sets).unwrap().plan(&LIT, &PlanOptions::new(extent)).unwrap().fingerprint()
+    };
     let base = of(&[], &[], [8, 4]);
     assert_eq!(base, of(&[], &[], [8, 4]));
     assert_eq!(base, of(&[], &["lamp.count=8"], [8, 4]));

@@ -9,7 +9,12 @@ pub mod scene_info;
 
 use crate::failure::Failure;
 use clap::Args;
-use lobelia::{SessionOptions, frame::SceneWorld, graph::{GraphFile, Override, Wired}, scene::Ndf};
+use lobelia::{
+    SessionOptions,
+    frame::SceneWorld,
+    graph::{GraphFile, Override, Wired},
+    scene::Ndf,
+};
 use std::path::{Path, PathBuf};
 
 /// A graph with its variants and overrides.

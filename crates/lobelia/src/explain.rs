@@ -66,7 +66,9 @@ fn quoted(text: &str) -> String {
 
 /// The plan as a Graphviz digraph: kept passes solid, dropped ones dashed, edges named by resource with their MiB, histories dotted.
 pub fn dot(plan: &Plan<SceneWorld>) -> String {
-    let mut out = String::from("digraph lobelia {\n  rankdir=LR;\n  node [shape=box, style=rounded, fontname=\"Helvetica\"];\n  edge [fontname=\"Helvetica\", fontsize=10];\n");
+    let mut out = String::from(
+        "digraph lobelia {\n  rankdir=LR;\n  node [shape=box, style=rounded, fontname=\"Helvetica\"];\n  edge [fontname=\"Helvetica\", fontsize=10];\n",
+    );
     let _ = write_dot(&mut out, plan);
     out.push_str("}\n");
     out

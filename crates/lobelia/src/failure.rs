@@ -1,6 +1,9 @@
 //! How errors reach the user: with the place in the file, and an exit code that says whose fault it is.
 
-use lobelia::{SessionError, graph::{GpuError, Problem, Problems, RunError}};
+use lobelia::{
+    SessionError,
+    graph::{GpuError, Problem, Problems, RunError},
+};
 use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, NamedSource, SourceCode};
 use std::{fmt, io::IsTerminal, process::ExitCode};
 

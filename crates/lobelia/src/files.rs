@@ -22,9 +22,7 @@ pub fn atomically(path: &Path, write: impl FnOnce(&mut std::fs::File) -> Result<
     // Temporary files are private; what comes of this one is a picture like any other, so the umask decides.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder
-        .tempfile_in(folder)
-        .map_err(|error| fail(format!("cannot write there: {error}")))?;
+    let mut file = builder.tempfile_in(folder).map_err(|error| fail(format!("cannot write there: {error}")))?;
     write(file.as_file_mut()).map_err(fail)?;
     file.as_file_mut().flush().map_err(|error| fail(error.to_string()))?;
     file.persist(path).map_err(|error| fail(error.to_string()))?;
@@ -63,14 +61,19 @@ pub fn check_folder(path: &Path) -> Result<(), Failure> {
     if path.is_dir() {
         return Err(Failure::Input(format!("{}: this is a folder; name a file", path.display())));
     }
-    if folder.is_dir() { Ok(()) } else { Err(Failure::Input(format!("{}: the folder {} does not exist", path.display(), folder.display()))) }
+    if folder.is_dir() {
+        Ok(())
+    } else {
+        Err(Failure::Input(format!("{}: the folder {} does not exist", path.display(), folder.display())))
+    }
 }
 
 /// Writes an 8-bit RGBA picture.
 pub fn write_png(path: &Path, extent: [u32; 2], rgba: &[u8]) -> Result<(), Failure> {
     atomically(path, |file| {
         let encoder = image::codecs::png::PngEncoder::new(std::io::BufWriter::new(file));
-        image::ImageEncoder::write_image(encoder, rgba, extent[0], extent[1], image::ExtendedColorType::Rgba8).map_err(|error| error.to_string())
+        image::ImageEncoder::write_image(encoder, rgba, extent[0], extent[1], image::ExtendedColorType::Rgba8)
+            .map_err(|error| error.to_string())
     })
 }
 

@@ -1,15 +1,13 @@
 //! From scene and graph to a picture.
 
+use glam::Vec2;
 use lobelia_frame::{DisplayImage, Radiance, SceneWorld};
-use lobelia_graph::{
-    FrameReport, Gpu, GpuError, GpuOptions, Plan, PlanOptions, Problems, Resource, RunError, RunOptions, Runner, Wired,
-};
+use lobelia_graph::{FrameReport, Gpu, GpuError, GpuOptions, Plan, PlanOptions, Problems, Resource, RunError, RunOptions, Runner, Wired};
 use lobelia_measure::Image;
 use lobelia_scene::{
     Camera, Ndf, Scene, SceneError,
     device::{GpuScene, ViewUniform},
 };
-use glam::Vec2;
 use std::sync::Arc;
 
 /// Why a session could not do what it was asked.
@@ -182,7 +180,10 @@ impl Session {
     /// Plans a graph for the scene and creates everything that it needs.
     pub fn start(&mut self, wired: &Wired<SceneWorld>, shot: &Shot) -> Result<Rendering<'_>, SessionError> {
         if shot.extent.contains(&0) || shot.extent.iter().any(|side| *side > 8192) {
-            return Err(SessionError::Argument(format!("a picture of {}x{} pixels cannot be made; each side must lie in [1, 8192]", shot.extent[0], shot.extent[1])));
+            return Err(SessionError::Argument(format!(
+                "a picture of {}x{} pixels cannot be made; each side must lie in [1, 8192]",
+                shot.extent[0], shot.extent[1]
+            )));
         }
         if shot.samples == 0 || shot.frames == 0 {
             return Err(SessionError::Argument("--samples and --frames must be at least 1".into()));
@@ -203,7 +204,18 @@ impl Session {
             _ => None,
         };
         let runner = Runner::new(&self.gpu, plan, &self.device, shot.run)?;
-        Ok(Rendering { session: self, runner, shot: shot.clone(), camera, output, shown, linear, sums: Vec::new(), reports: Vec::new(), view: None })
+        Ok(Rendering {
+            session: self,
+            runner,
+            shot: shot.clone(),
+            camera,
+            output,
+            shown,
+            linear,
+            sums: Vec::new(),
+            reports: Vec::new(),
+            view: None,
+        })
     }
 }
 

@@ -19,7 +19,8 @@ pub fn aces(radiance: DVec3) -> DVec3 {
     let color = radiance.clamp(DVec3::ZERO, DVec3::splat(MAX_INPUT));
     let c = rows([[0.59719, 0.35458, 0.04823], [0.076, 0.90834, 0.01566], [0.0284, 0.13383, 0.83777]], color);
     let fitted = (c * (c + 0.024_578_6) - 0.000_090_537) / (c * (0.983_729 * c + 0.432_951) + 0.238_081);
-    rows([[1.60475, -0.53108, -0.07367], [-0.10208, 1.10813, -0.00605], [-0.00327, -0.07276, 1.07602]], fitted).clamp(DVec3::ZERO, DVec3::ONE)
+    rows([[1.60475, -0.53108, -0.07367], [-0.10208, 1.10813, -0.00605], [-0.00327, -0.07276, 1.07602]], fitted)
+        .clamp(DVec3::ZERO, DVec3::ONE)
 }
 
 /// AgX (Troy Sobotka), base look, contrast fit by Benjamin Wrensch 2023; linear in, linear out.

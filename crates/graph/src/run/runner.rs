@@ -218,13 +218,7 @@ impl<W: World> Runner<W> {
     }
 
     /// Runs one frame. `progress` hears of long work and may stop it by returning `false`.
-    pub fn run(
-        &mut self,
-        gpu: &Gpu,
-        world: &W::Device,
-        seed: u32,
-        progress: &mut Progress<'_>,
-    ) -> Result<FrameReport, RunError> {
+    pub fn run(&mut self, gpu: &Gpu, world: &W::Device, seed: u32, progress: &mut Progress<'_>) -> Result<FrameReport, RunError> {
         let side = (self.frame % 2) as usize % self.sides;
         let info = FrameInfo { index: self.frame, seed };
         let mut encoder = gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("lobelia frame") });
@@ -339,10 +333,9 @@ impl<W: World> Runner<W> {
     pub fn resource<R: Resource>(&self, name: &str) -> Result<R, RunError> {
         let (resource, parts) = self.kept_parts(name)?;
         let shape = resource.shape.as_ref().as_any().downcast_ref::<R::Shape>();
-        let shape = shape.filter(|_| resource.type_name == R::NAME).ok_or_else(|| RunError::Pass {
-            pass: name.into(),
-            message: format!("it is {}, not {}", resource.type_name, R::NAME),
-        })?;
+        let shape = shape
+            .filter(|_| resource.type_name == R::NAME)
+            .ok_or_else(|| RunError::Pass { pass: name.into(), message: format!("it is {}, not {}", resource.type_name, R::NAME) })?;
         Ok(R::assemble(shape, &parts))
     }
 
@@ -381,7 +374,9 @@ impl<W: World> Runner<W> {
                 let half = |value: f32| half::f16::from_f32(value.clamp(-65504.0, 65504.0)).to_le_bytes();
                 (pixels.iter().flat_map(|[r, g, b]| [*r, *g, *b, 1.0]).flat_map(half).collect(), 8)
             }
-            wgpu::TextureFormat::Rgba32Float => (pixels.iter().flat_map(|[r, g, b]| [*r, *g, *b, 1.0]).flat_map(f32::to_le_bytes).collect(), 16),
+            wgpu::TextureFormat::Rgba32Float => {
+                (pixels.iter().flat_map(|[r, g, b]| [*r, *g, *b, 1.0]).flat_map(f32::to_le_bytes).collect(), 16)
+            }
             _ => return Err(refuse("its format cannot be written")),
         };
         let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
@@ -488,7 +483,12 @@ fn clear_texture(gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, texture: &wgpu::
             } else {
                 let pitch = width * format.block_copy_size(None).unwrap_or(4);
                 gpu.queue().write_texture(
-                    wgpu::TexelCopyTextureInfo { texture, mip_level: mip, origin: wgpu::Origin3d { x: 0, y: 0, z: layer }, aspect: wgpu::TextureAspect::All },
+                    wgpu::TexelCopyTextureInfo {
+                        texture,
+                        mip_level: mip,
+                        origin: wgpu::Origin3d { x: 0, y: 0, z: layer },
+                        aspect: wgpu::TextureAspect::All,
+                    },
                     &vec![0; pitch as usize * height as usize],
                     wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(pitch), rows_per_image: Some(height) },
                     wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
@@ -505,7 +505,14 @@ fn flush(gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, timer: &mut Timer) -> Re
     gpu.wait()
 }
 
-fn poison<W: World>(checker: &Checker, encoder: &mut wgpu::CommandEncoder, plan: &Plan<W>, pass: &PlannedPass<W>, slots: &[SlotHandle], side: usize) {
+fn poison<W: World>(
+    checker: &Checker,
+    encoder: &mut wgpu::CommandEncoder,
+    plan: &Plan<W>,
+    pass: &PlannedPass<W>,
+    slots: &[SlotHandle],
+    side: usize,
+) {
     for index in &pass.outputs {
         let resource = &plan.resources[*index];
         let offset = if resource.history { side * resource.parts.len() } else { 0 };
@@ -532,7 +539,9 @@ fn count<W: World>(
         let Some(parts) = connected.parts(&resource.name) else { continue };
         for (part, (_, handle)) in resource.parts.iter().zip(parts.iter()) {
             if part.values != Values::Any {
-                checker.count(gpu, encoder, handle, part.values, &pass.name, &format!("{}/{}", resource.name, part.name)).map_err(safety_net)?;
+                checker
+                    .count(gpu, encoder, handle, part.values, &pass.name, &format!("{}/{}", resource.name, part.name))
+                    .map_err(safety_net)?;
             }
         }
     }

@@ -2,9 +2,9 @@
 #![allow(dead_code, missing_docs, clippy::unwrap_used)]
 
 use lobelia_graph::{
-    BuildError, CreateContext, DeviceOf, Frame, GraphFile, History, InputShapes, Need, NoParams, NoPorts, OrNone, OutputShapes, Override, Params, Part,
-    PartSet, Pass, Plan, PlanContext, PlanOptions, PortError, Ports, Problems, Registry, Resource, RunError, Specialisation, TexturePart, TraitsOf, Values,
-    Wired, World,
+    BuildError, CreateContext, DeviceOf, Frame, GraphFile, History, InputShapes, Need, NoParams, NoPorts, OrNone, OutputShapes, Override,
+    Params, Part, PartSet, Pass, Plan, PlanContext, PlanOptions, PortError, Ports, Problems, Registry, Resource, RunError, Specialisation,
+    TexturePart, TraitsOf, Values, Wired, World,
 };
 use serde::{Deserialize, Serialize};
 

@@ -1,5 +1,8 @@
 use crate::failure::Failure;
-use lobelia::{Session, SessionOptions, graph::{GraphFile, PlanOptions}};
+use lobelia::{
+    Session, SessionOptions,
+    graph::{GraphFile, PlanOptions},
+};
 use std::{io::Write, path::PathBuf};
 
 /// Check graph files: the base and every variant of each. With a scene, plan them for it too. Needs no device.

@@ -80,7 +80,8 @@ fn describe(out: &mut impl Write, info: &PassInfo) -> std::io::Result<()> {
 
 fn json(info: &PassInfo) -> serde_json::Value {
     let ports = |ports: &[PortInfo]| -> Vec<_> {
-        let port = |port: &PortInfo| serde_json::json!({"name": port.name, "type": port.resource.name, "doc": port.doc, "arity": arity(port)});
+        let port =
+            |port: &PortInfo| serde_json::json!({"name": port.name, "type": port.resource.name, "doc": port.doc, "arity": arity(port)});
         ports.iter().map(port).collect()
     };
     let params: Vec<_> = info

@@ -177,7 +177,9 @@ fn check_kinds(arguments: &Arguments, plan: &Plan<SceneWorld>) -> Result<(), Fai
 fn warn_unlit(arguments: &Arguments, traits: &lobelia::scene::SceneTraits) {
     let area = traits.quad_lights + traits.disk_lights + traits.sphere_lights;
     if area > 0 && traits.punctual_lights() == 0 && !arguments.quiet {
-        eprintln!("warning: the scene is lit by {area} area light(s) only, and no pass of this graph casts their light; they are drawn, but light nothing");
+        eprintln!(
+            "warning: the scene is lit by {area} area light(s) only, and no pass of this graph casts their light; they are drawn, but light nothing"
+        );
     } else if area == 0 && traits.punctual_lights() == 0 && !arguments.quiet {
         eprintln!("warning: the scene has no light that a pass of this graph casts; only emission and background are seen");
     }
@@ -290,8 +292,11 @@ fn report(arguments: &Arguments, rendering: &Rendering<'_>, timing: Timing) -> R
                 })
             })
             .collect();
-        let dropped: Vec<_> =
-            plan.dropped.iter().map(|dropped| serde_json::json!({"pass": dropped.pass, "kind": dropped.kind, "reason": dropped.reason})).collect();
+        let dropped: Vec<_> = plan
+            .dropped
+            .iter()
+            .map(|dropped| serde_json::json!({"pass": dropped.pass, "kind": dropped.kind, "reason": dropped.reason}))
+            .collect();
         let value = serde_json::json!({
             "graph": arguments.graph.graph, "scene": arguments.scene.scene, "variants": arguments.graph.variants, "device": adapter,
             "size": arguments.size, "samples": arguments.samples, "frames": arguments.frames, "seed": arguments.seed, "timing": how,
