@@ -3,6 +3,35 @@
 //! Geometry is kept in world space in `f64` transforms; what goes to the device is *scene space*, world minus a whole-metre [`Scene::origin`], so
 //! that 32-bit floats keep their precision ten kilometres from the world's origin. Conventions: right-handed, +Y up, metres, linear Rec. 709
 //! colour, no photometric factors (a candela is a watt per steradian, per channel).
+//!
+//! An address given to [`Scene::load`] is `builtin:NAME` (see [`builtin_names`]), a `.glb` or `.gltf` file, or a RON scene, which wraps one of these:
+//!
+//! ```ron
+//! (
+//!     gltf: "atrium.glb",                          // beside this file, or "builtin:cornell-glossy"
+//!     ndf: phong,                                  // ggx (default) or phong
+//!     environment: (file: "sky.hdr", scale: 0.5),  // .hdr or .exr
+//!     cameras: {                                   // added, or replacing one of that name; the first is the default
+//!         "close": (origin: (0, 1, 3), target: (0, 1, 0), up: (0, 1, 0), yfov: 0.7, near: 0.01),
+//!     },
+//!     keep_lights: false,                          // drops the file's lights, area lights with their surfaces
+//!     lights: {                                    // added, or replacing one of that name; angles are radians
+//!         "key": spot(position: (0, 2, 0), direction: (0, -1, 0), intensity: (9, 9, 9), inner: 0.3, outer: 0.6),
+//!         "bulb": point(position: (1, 1, 1), intensity: (2, 2, 2)),
+//!         "sun": directional(direction: (0, -1, -1), illuminance: (3, 3, 3)),
+//!     },
+//!     materials: {                                 // in this order; "*" is every surface that is not an area light's
+//!         "*": (specular: 0.0),
+//!         "Gold": (roughness: 0.2, base_color: (1, 0.8, 0.3), metallic: 1, emissive: (0, 0, 0), normal_map: false),
+//!     },
+//! )
+//! ```
+//!
+//! A glTF node with `extras.area_light` is a light with extent: `{"shape": "quad", "width", "height"}`, `{"shape": "disk", "radius"}` or
+//! `{"shape": "sphere", "radius"}`, each with `"radiance": [r, g, b]`; quad and disk emit towards local -Z.
+//!
+//! Not drawn as the file says, with a word in [`Scene::warnings`]: blended surfaces (opaque here), skins and morph targets, vertex colours, occlusion
+//! textures, points and lines, ranges of lights, texture coordinates other than set 0, and extensions that are not required.
 
 mod animation;
 mod builtin;

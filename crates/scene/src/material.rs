@@ -85,7 +85,7 @@ impl AlphaMode {
 /// A texture and how it is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct TextureRef {
-    /// Index into [`Scene::textures`].
+    /// Index into [`crate::Scene::textures`].
     pub texture: usize,
     /// Wrapping and filtering.
     pub sampler: Sampler,

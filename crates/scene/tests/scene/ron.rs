@@ -79,6 +79,20 @@ fn everything_can_be_added_or_overridden() {
 }
 
 #[test]
+fn the_example_of_the_documentation_loads() {
+    let documentation = include_str!("../../src/lib.rs");
+    let (_, after) = documentation.split_once("```ron\n").unwrap();
+    let (example, _) = after.split_once("//! ```").unwrap();
+    let text = example
+        .replace("//! ", "")
+        .replace("atrium.glb", "builtin:ring-caustic")
+        .replace("sky.hdr", "sky.exr")
+        .replace("\"Gold\"", "\"ring\"");
+    let scene = load(&text).unwrap();
+    assert_eq!((scene.lights.len(), scene.camera(None).unwrap().name.as_str(), scene.ndf), (3, "close", Ndf::Phong));
+}
+
+#[test]
 fn little_is_needed() {
     let scene = load("(gltf: \"triangle.glb\")").unwrap();
     assert_eq!((scene.triangles().len(), scene.ndf), (1, Ndf::Ggx));
