@@ -1,12 +1,28 @@
-//! EXR files: channels R, G, B, row 0 at the top.
+//! EXR files (channels R, G, B, row 0 at the top) and PNG files. Whatever is written appears whole or not at all.
 
 use crate::{Image, MeasureError};
-use exr::prelude::{self as files, WritableImage as _};
-use std::path::Path;
+use exr::prelude::{self as files, WritableImage as _, f16};
+use std::{
+    io::{BufWriter, Seek, Write},
+    path::Path,
+};
+
+/// What an EXR file stores for each channel of a pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Precision {
+    /// 16 bits: relative precision 2^-11 down to 6.1e-5, largest value 65504.
+    Half,
+    /// 32 bits: bit for bit what [`Image`] holds.
+    #[default]
+    Float,
+}
+
+fn failure(path: &Path, reason: impl std::fmt::Display) -> MeasureError {
+    MeasureError::File { file: path.display().to_string(), reason: reason.to_string() }
+}
 
 /// Reads the R, G, B channels of the first layer that has them; half or float.
 pub fn read_exr(path: &Path) -> Result<Image, MeasureError> {
-    let fail = |reason: String| MeasureError::File { file: path.display().to_string(), reason };
     let read = files::read_first_rgba_layer_from_file(
         path,
         |resolution, _| (resolution.width(), vec![[0.0f32; 3]; resolution.width() * resolution.height()]),
@@ -14,44 +30,147 @@ pub fn read_exr(path: &Path) -> Result<Image, MeasureError> {
             pixels[position.y() * *width + position.x()] = [r, g, b];
         },
     )
-    .map_err(|error| fail(format!("cannot be read as an EXR picture: {error}")))?;
+    .map_err(|error| failure(path, format!("cannot be read as an EXR picture: {error}")))?;
     let size = read.layer_data.size;
     let (_, pixels) = read.layer_data.channel_data.pixels;
     Ok(Image { width: size.width(), height: size.height(), pixels })
 }
 
-/// Writes 32-bit floats through a temporary file in the same folder.
+/// Writes an EXR file of [`Precision::Float`].
 pub fn write_exr(path: &Path, image: &Image) -> Result<(), MeasureError> {
-    let fail = |reason: String| MeasureError::File { file: path.display().to_string(), reason };
-    let name = path.file_name().and_then(|name| name.to_str()).ok_or_else(|| fail("not a file name".into()))?;
-    let temporary = path.with_file_name(format!(".{name}.{}.tmp", std::process::id()));
-    let channels = files::SpecificChannels::rgb(|position: files::Vec2<usize>| {
-        let [r, g, b] = image.pixels[position.y() * image.width + position.x()];
-        (r, g, b)
-    });
-    let written = files::Image::from_channels((image.width, image.height), channels).write().to_file(&temporary);
-    let renamed = written.map_err(|error| error.to_string()).and_then(|()| std::fs::rename(&temporary, path).map_err(|error| error.to_string()));
-    renamed.map_err(|reason| {
-        // Nothing half-written stays behind; if it cannot be removed, the first error still says why.
-        let _ = std::fs::remove_file(&temporary);
-        fail(format!("cannot be written: {reason}"))
+    write_exr_with(path, image, Precision::Float)
+}
+
+/// Writes an EXR file. NaN and infinity are written as they are; a finite value that would become infinite as a half float is refused by its place.
+pub fn write_exr_with(path: &Path, image: &Image, precision: Precision) -> Result<(), MeasureError> {
+    image.check_size().map_err(|error| failure(path, error))?;
+    let pixel = |position: files::Vec2<usize>| image.pixels[position.y() * image.width + position.x()];
+    match precision {
+        Precision::Float => write_channels(path, image, |position: files::Vec2<usize>| pixel(position).into()),
+        Precision::Half => {
+            let overflows = |value: &f32| value.is_finite() && f16::from_f32(*value).is_infinite();
+            if let Some(place) = image.pixels.iter().position(|pixel| pixel.iter().any(overflows)) {
+                let (x, y) = (place % image.width, place / image.width);
+                return Err(failure(path, format!("pixel ({x}, {y}) is beyond 65504, the largest half float; write 32-bit floats")));
+            }
+            write_channels(path, image, |position: files::Vec2<usize>| pixel(position).map(f16::from_f32).into())
+        }
+    }
+}
+
+fn write_channels<S: files::IntoSample>(
+    path: &Path,
+    image: &Image,
+    pixel: impl Fn(files::Vec2<usize>) -> (S, S, S) + Sync,
+) -> Result<(), MeasureError> {
+    let picture = files::Image::from_channels((image.width, image.height), files::SpecificChannels::rgb(pixel));
+    replace_file(path, |file| picture.write().to_buffered(file).map_err(|error| error.to_string()))
+}
+
+/// Writes an 8-bit picture; `rgba` holds sRGB-encoded colours and alpha, row 0 at the top.
+pub fn write_png(path: &Path, width: u32, height: u32, rgba: &[u8]) -> Result<(), MeasureError> {
+    let bytes = (u64::from(width) * u64::from(height)).checked_mul(4);
+    if rgba.is_empty() || bytes != Some(rgba.len() as u64) {
+        return Err(failure(path, format!("{} bytes are no picture of {width} x {height} pixels of 4 bytes", rgba.len())));
+    }
+    replace_file(path, |file| {
+        let encoder = image::codecs::png::PngEncoder::new(file);
+        image::ImageEncoder::write_image(encoder, rgba, width, height, image::ExtendedColorType::Rgba8).map_err(|error| error.to_string())
     })
 }
+
+/// Gives a file new contents through a temporary file in the same folder, renamed when all is written: readers see the old file or the new one, and
+/// a failure leaves the old one untouched and nothing beside it.
+pub fn replace_file<F>(path: &Path, write: F) -> Result<(), MeasureError>
+where
+    F: FnOnce(&mut (dyn WriteSeek + '_)) -> Result<(), String>,
+{
+    // The parent of a bare file name is the empty path.
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let cannot = |error: String| failure(path, format!("cannot be written: {error}"));
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".lobelia-").suffix(".tmp");
+    #[cfg(unix)]
+    // As for any new file, the user's mask takes rights away; a temporary file would be for its owner alone.
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let temporary = builder.tempfile_in(folder).map_err(|error| cannot(error.to_string()))?;
+    let mut buffered = BufWriter::new(temporary);
+    write(&mut buffered).map_err(cannot)?;
+    let temporary = buffered.into_inner().map_err(|error| cannot(error.to_string()))?;
+    temporary.persist(path).map_err(|error| cannot(error.to_string()))?;
+    Ok(())
+}
+
+/// A place that bytes can be written to in any order.
+pub trait WriteSeek: Write + Seek {}
+impl<T: Write + Seek> WriteSeek for T {}
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 
+    fn picture() -> Image {
+        let pixels = (0..15).map(|index| [index as f32 * 0.37, 1e-6 * index as f32, 65504.0]).collect();
+        Image { width: 5, height: 3, pixels }
+    }
+
+    fn files_in(folder: &Path) -> usize {
+        std::fs::read_dir(folder).unwrap().count()
+    }
+
     #[test]
     fn comes_back_bit_for_bit_and_leaves_nothing_else() {
         let folder = tempfile::tempdir().unwrap();
-        let pixels = (0..15).map(|index| [index as f32 * 0.37, 1e-6 * index as f32, 65504.0]).collect();
-        let image = Image { width: 5, height: 3, pixels };
         let path = folder.path().join("a.exr");
-        write_exr(&path, &image).unwrap();
-        assert_eq!(read_exr(&path).unwrap(), image);
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        write_exr(&path, &picture()).unwrap();
+        assert_eq!(read_exr(&path).unwrap(), picture());
+        let turned = Image { pixels: picture().pixels.into_iter().rev().collect(), ..picture() };
+        write_exr(&path, &turned).unwrap();
+        assert_eq!(read_exr(&path).unwrap(), turned, "it replaces what was there");
+        assert_eq!(files_in(folder.path()), 1);
+    }
+
+    #[test]
+    fn half_floats_round_to_nearest() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("half.exr");
+        write_exr_with(&path, &picture(), Precision::Half).unwrap();
+        let back = read_exr(&path).unwrap();
+        let rounded = picture().pixels.iter().map(|pixel| pixel.map(|value| f16::from_f32(value).to_f32())).collect();
+        assert_eq!(back, Image { pixels: rounded, ..picture() });
+        assert_ne!(back, picture(), "16 bits do not hold all of it");
+    }
+
+    #[test]
+    fn what_half_floats_cannot_hold_is_refused_by_place() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("half.exr");
+        let mut bright = picture();
+        bright.pixels[7][1] = 65520.0;
+        let refused = write_exr_with(&path, &bright, Precision::Half).unwrap_err().to_string();
+        assert!(refused.contains("half.exr") && refused.contains("pixel (2, 1)"), "{refused}");
+        assert_eq!(files_in(folder.path()), 0);
+        write_exr(&path, &bright).unwrap();
+        // The largest that still rounds down.
+        bright.pixels[7][1] = 65519.0;
+        write_exr_with(&path, &bright, Precision::Half).unwrap();
+        assert_eq!(read_exr(&path).unwrap().pixels[7][1], 65504.0);
+    }
+
+    #[test]
+    fn a_png_comes_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let rgba: Vec<u8> = (0..24).map(|index| index * 10).collect();
+        write_png(&path, 3, 2, &rgba).unwrap();
+        let back = image::open(&path).unwrap();
+        assert_eq!((back.width(), back.height(), back.color()), (3, 2, image::ColorType::Rgba8));
+        assert_eq!(back.to_rgba8().into_raw(), rgba);
+        assert_eq!(files_in(folder.path()), 1);
+        for (width, height) in [(2, 2), (0, 0), (u32::MAX, u32::MAX)] {
+            assert!(write_png(&path, width, height, &rgba).is_err());
+        }
     }
 
     #[test]
@@ -61,5 +180,38 @@ mod tests {
         std::fs::write(&path, b"not a picture").unwrap();
         assert!(read_exr(&path).unwrap_err().to_string().contains("b.exr"));
         assert!(read_exr(&folder.path().join("missing.exr")).is_err());
+        write_exr(&path, &picture()).unwrap();
+        let whole = std::fs::read(&path).unwrap();
+        for length in [4, whole.len() / 2, whole.len() - 1] {
+            std::fs::write(&path, &whole[..length]).unwrap();
+            assert!(read_exr(&path).is_err(), "cut to {length} of {} bytes", whole.len());
+        }
+        assert!(write_exr(&path, &Image { width: 4, ..picture() }).unwrap_err().to_string().contains("15 pixels"));
+    }
+
+    #[test]
+    fn a_failure_leaves_the_old_file_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("c.txt");
+        std::fs::write(&path, "old").unwrap();
+        let failed = replace_file(&path, |file| {
+            file.write_all(b"half of the new").unwrap();
+            Err("the disk is full".into())
+        });
+        assert!(failed.unwrap_err().to_string().contains("the disk is full"));
+        assert_eq!((std::fs::read_to_string(&path).unwrap().as_str(), files_in(folder.path())), ("old", 1));
+        assert!(write_exr(&folder.path().join("missing").join("a.exr"), &picture()).is_err());
+    }
+
+    /// Others may read a picture as they may any new file.
+    #[cfg(unix)]
+    #[test]
+    fn rights_are_those_of_any_new_file() {
+        use std::os::unix::fs::PermissionsExt as _;
+        let folder = tempfile::tempdir().unwrap();
+        let rights = |name: &str| std::fs::metadata(folder.path().join(name)).unwrap().permissions().mode();
+        std::fs::write(folder.path().join("plain"), "").unwrap();
+        replace_file(&folder.path().join("replaced"), |_| Ok(())).unwrap();
+        assert_eq!(rights("replaced"), rights("plain"));
     }
 }

@@ -1,10 +1,15 @@
 //! Measuring pictures. A metric is named for exactly what it computes.
+//!
+//! [`compare`] gives every metric of a reference and a test image at once, where a [`Mask`] counts; [`relative_mse`], [`relative_mse_with_epsilon`]
+//! and [`rmse`] give one over all pixels. All sums are 64-bit floats. [`read_exr`], [`write_exr`] and [`write_png`] move pictures in and out.
 
 mod image_file;
+mod mask;
 mod metric;
 
-pub use image_file::{read_exr, write_exr};
-pub use metric::{Mask, Statistics, compare, mean, relative_mse, rmse};
+pub use image_file::{Precision, WriteSeek, read_exr, replace_file, write_exr, write_exr_with, write_png};
+pub use mask::Mask;
+pub use metric::{Statistics, compare, mean, relative_mse, relative_mse_with_epsilon, rmse};
 
 /// Linear RGB, row 0 at the top.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +25,7 @@ pub struct Image {
 impl Image {
     /// Means of k x k blocks; sides must be multiples of k.
     pub fn downsampled(&self, k: usize) -> Result<Image, MeasureError> {
+        self.check_size()?;
         if k == 0 || !self.width.is_multiple_of(k) || !self.height.is_multiple_of(k) {
             return Err(MeasureError::Size(format!("{} x {} pixels cannot be divided into blocks of {k}", self.width, self.height)));
         }
@@ -39,6 +45,14 @@ impl Image {
             }
         }
         Ok(Image { width, height, pixels })
+    }
+
+    /// The fields are public, so nothing else holds them together.
+    fn check_size(&self) -> Result<(), MeasureError> {
+        if self.pixels.is_empty() || self.width.checked_mul(self.height) != Some(self.pixels.len()) {
+            return Err(MeasureError::Size(format!("{} pixels are no picture of {} x {}", self.pixels.len(), self.width, self.height)));
+        }
+        Ok(())
     }
 }
 
@@ -61,6 +75,9 @@ pub enum MeasureError {
     /// Nothing is left to compare.
     #[error("the mask leaves no pixel to compare")]
     EmptyMask,
+    /// A floor below 0 or without a finite value.
+    #[error("epsilon is {0}; it must be finite and not below 0")]
+    Epsilon(f64),
     /// A file.
     #[error("{file}: {reason}")]
     File {
@@ -69,4 +86,27 @@ pub enum MeasureError {
         /// What went wrong.
         reason: String,
     },
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_are_averaged() {
+        let picture = Image { width: 2, height: 2, pixels: vec![[0.0; 3], [1.0; 3], [2.0; 3], [5.0; 3]] };
+        assert_eq!(picture.downsampled(2).unwrap().pixels, [[2.0; 3]]);
+        assert_eq!(picture.downsampled(1).unwrap(), picture);
+        let wide = Image { width: 4, height: 2, pixels: (0..8).map(|index| [index as f32, 0.0, 1.0]).collect() };
+        assert_eq!(wide.downsampled(2).unwrap().pixels, [[2.5, 0.0, 1.0], [4.5, 0.0, 1.0]]);
+    }
+
+    #[test]
+    fn what_has_no_blocks_is_refused() {
+        let picture = Image { width: 2, height: 2, pixels: vec![[0.0; 3]; 4] };
+        assert!(picture.downsampled(3).is_err());
+        assert!(picture.downsampled(0).is_err());
+        assert!(Image { width: 4, ..picture }.downsampled(2).is_err());
+    }
 }
