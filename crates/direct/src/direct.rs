@@ -2,8 +2,8 @@
 
 use lobelia_frame::{GBuffer, ImageShape, Radiance, ReflectiveShadowMap, SceneWorld};
 use lobelia_graph::{
-    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, ParamValue, Pass, PlanContext, PortError, Ports,
-    RunError, Specialisation, TraitsOf,
+    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, ParamValue, Pass, PlanContext, PortError,
+    Ports, RunError, Specialisation, TraitsOf,
 };
 use lobelia_scene::Ndf;
 use lobelia_shaders::Source;
@@ -105,9 +105,17 @@ impl Pass for DirectPass {
         let flags = inputs.gbuffer.flags;
         let mut found = reflectance_flags(flags.specular, flags.normal_map, context.traits.ndf);
         let shadows = inputs.rsm.is_some();
-        found.push(Specialisation::new("SHADOWS", shadows, if shadows { "a shadow map is connected" } else { "no shadow map is connected" }));
+        found.push(Specialisation::new(
+            "SHADOWS",
+            shadows,
+            if shadows { "a shadow map is connected" } else { "no shadow map is connected" },
+        ));
         let depth = shadows && context.params.comparison == Comparison::Depth;
-        found.push(Specialisation::new("DEPTH_COMPARISON", depth, if depth { "comparison: depth" } else { "texels count as planes, or not at all" }));
+        found.push(Specialisation::new(
+            "DEPTH_COMPARISON",
+            depth,
+            if depth { "comparison: depth" } else { "texels count as planes, or not at all" },
+        ));
         found
     }
 

@@ -54,20 +54,40 @@ fn caster_normal(texel: vec2u, layer: u32) -> vec3f {
 #endif
 }
 
-// How far the surface in one texel reaches up along the ray to the point at `uv`: distance along the face's forward axis, metres.
-// `reach` is how far the texel's plane is trusted, metres.
-fn caster_distance(face: RsmFace, layer: u32, texel: vec2u, uv: vec2f, depth: f32, reach: f32) -> f32 {
+// A point that may be in shadow, as a face of a map sees it.
+struct Receiver {
+    position: vec3f,
+    // Geometric, on the side that is lit.
+    normal: vec3f,
+    uv: vec2f,
+    // Along the face's forward axis, metres.
+    distance: f32,
+    // Metres by which a caster must stand before it.
+    slack: f32,
+    // What rounding makes of distances, metres.
+    rounding: f32,
+    // How far the plane of a texel is trusted, metres.
+    reach: f32,
+}
+
+// Whether the surface in one texel stands between the light and the receiver.
+fn shades(face: RsmFace, layer: u32, texel: vec2u, depth: f32, receiver: Receiver) -> bool {
     let caster = rsm_distance(face, depth);
 #ifdef DEPTH_COMPARISON
-    return caster;
+    return caster < receiver.distance - receiver.slack;
 #else
-    let normal = caster_normal(texel, layer);
+    // Past a convex edge the receiver is met below the other side's plane, but no caster stands behind the receiver's own plane.
     let texel_uv = (vec2f(texel) + vec2f(0.5)) / f32(textureDimensions(rsm_depth).x);
-    let on_plane = rsm_ray_origin(face, texel_uv) + rsm_ray(face, texel_uv) * caster;
-    let descent = dot(rsm_ray(face, uv), normal);
-    let rise = dot(on_plane - rsm_ray_origin(face, uv), normal);
+    let seen = rsm_ray_origin(face, texel_uv) + rsm_ray(face, texel_uv) * caster;
+    if dot(seen - receiver.position, receiver.normal) <= receiver.rounding {
+        return false;
+    }
+    let normal = caster_normal(texel, layer);
+    let descent = dot(rsm_ray(face, receiver.uv), normal);
+    let rise = dot(seen - rsm_ray_origin(face, receiver.uv), normal);
     // A plane seen edge-on says nothing about its neighbourhood.
-    return select(caster, clamp(rise / descent, caster - reach, caster + reach), abs(descent) > 1e-4);
+    let met = select(caster, clamp(rise / descent, caster - receiver.reach, caster + receiver.reach), abs(descent) > 1e-4);
+    return met < receiver.distance - receiver.slack;
 #endif
 }
 
@@ -85,12 +105,14 @@ fn shadow(first: RsmFace, position: vec3f, geometric_normal: vec3f) -> f32 {
     }
     let width_at_one = 2.0 * length(face.right) / resolution;
     let footprint = select(width_at_one * projected.z, width_at_one, face.depth_range != 0.0);
-    var slack = settings.bias * footprint + projected.z * 2.44140625e-4;
+    let rounding = projected.z * 2.44140625e-4;
+    var slack = settings.bias * footprint + rounding;
 #ifdef DEPTH_COMPARISON
     // Over one texel the receiver's own depth changes by the tangent of its slope.
     let cosine = abs(dot(geometric_normal, rsm_direction_to_light(face, position)));
     slack += settings.bias * footprint * min(sqrt(max(1.0 - cosine * cosine, 0.0)) / max(cosine, 1e-3), MAX_SLOPE);
 #endif
+    let receiver = Receiver(position, geometric_normal, projected.xy, projected.z, slack, rounding, MAX_SLOPE * footprint);
     let width = i32(settings.filter_width);
     let corner = projected.xy * resolution - vec2f(0.5 * f32(width));
     let base = vec2i(floor(corner));
@@ -103,7 +125,7 @@ fn shadow(first: RsmFace, position: vec3f, geometric_normal: vec3f) -> f32 {
             let weight_x = select(select(1.0, 1.0 - fraction.x, x == 0), fraction.x, x == width);
             let texel = vec2u(clamp(base + vec2i(x, y), vec2i(0), vec2i(last)));
             let depth = textureLoad(rsm_depth, texel, layer, 0);
-            if depth <= 0.0 || caster_distance(face, layer, texel, projected.xy, depth, MAX_SLOPE * footprint) >= projected.z - slack {
+            if depth <= 0.0 || !shades(face, layer, texel, depth, receiver) {
                 lit += weight_x * weight_y;
             }
         }

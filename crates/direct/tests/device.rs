@@ -4,8 +4,8 @@
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use lobelia_frame::{GBuffer, GBufferShape, SceneWorld, SurfaceFlags, SurfaceFormats};
 use lobelia_graph::{
-    BuildError, CreateContext, DeviceOf, Frame, Gpu, GraphFile, InputShapes, NoPorts, OutputShapes, Params, Pass, PlanContext, PlanOptions, PortError,
-    Ports, RasterDescription, RasterPipeline, Registry, RunError, RunOptions, Runner, testing::gpu,
+    BuildError, CreateContext, DeviceOf, Frame, Gpu, GraphFile, InputShapes, NoPorts, OutputShapes, Params, Pass, PlanContext, PlanOptions,
+    PortError, Ports, RasterDescription, RasterPipeline, Registry, RunError, RunOptions, Runner, testing::gpu,
 };
 use lobelia_lobes::{
     brdf::{Brdf, Distribution},
@@ -421,7 +421,12 @@ fn extremes_stay_finite() {
             _ => LightKind::Spot { inner: 0.3, outer: 0.3 },
         };
         let ndf = if round % 2 == 0 { Ndf::Ggx } else { Ndf::Phong };
-        let mut case = Case::new(&[(kind, DVec3::ZERO, random.direction(), intensity), (kind, random.direction() * 1e9, random.direction(), intensity)], ndf, true, true);
+        let mut case = Case::new(
+            &[(kind, DVec3::ZERO, random.direction(), intensity), (kind, random.direction() * 1e9, random.direction(), intensity)],
+            ndf,
+            true,
+            true,
+        );
         let bits = |random: &mut Random| (random.next() * 4294967296.0) as u32;
         let mut pixels: Vec<Pixel> = (0..EXTENT[0] * EXTENT[1])
             .map(|_| Pixel {

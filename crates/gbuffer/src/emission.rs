@@ -2,8 +2,8 @@
 
 use lobelia_frame::{GBuffer, ImageShape, Radiance, SceneWorld};
 use lobelia_graph::{
-    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, NoParams, OutputShapes, Pass, PlanContext, PortError, Ports, RunError,
-    Specialisation, TraitsOf,
+    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, NoParams, OutputShapes, Pass, PlanContext, PortError,
+    Ports, RunError, Specialisation, TraitsOf,
 };
 use lobelia_shaders::Source;
 
@@ -44,14 +44,22 @@ impl Pass for EmissionPass {
     type Bindings = Bindings;
 
     fn need(_: &NoParams, traits: &TraitsOf<Self>) -> Need {
-        if traits.emissive || traits.environment { Need::Run } else { Need::Omit("the scene has no emissive material and no environment map".into()) }
+        if traits.emissive || traits.environment {
+            Need::Run
+        } else {
+            Need::Omit("the scene has no emissive material and no environment map".into())
+        }
     }
 
     fn specialise(context: &PlanContext<'_, Self>, inputs: &InputShapes<Self>) -> Vec<Specialisation> {
         let (emissive, environment) = (inputs.gbuffer.flags.emissive, context.traits.environment);
         vec![
             Specialisation::new("EMISSIVE", emissive, if emissive { "a material emits" } else { "no material emits" }),
-            Specialisation::new("ENVIRONMENT", environment, if environment { "the scene has an environment map" } else { "the scene has no environment map" }),
+            Specialisation::new(
+                "ENVIRONMENT",
+                environment,
+                if environment { "the scene has an environment map" } else { "the scene has no environment map" },
+            ),
         ]
     }
 

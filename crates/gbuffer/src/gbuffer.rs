@@ -2,8 +2,8 @@
 
 use lobelia_frame::{GBuffer, GBufferShape, SceneWorld, SurfaceFlags, SurfaceFormats};
 use lobelia_graph::{
-    BuildError, CreateContext, DeviceOf, Frame, InputShapes, NoParams, NoPorts, OutputShapes, Pass, PlanContext, PortError, Ports, RasterDescription,
-    RasterPipeline, RunError, Specialisation,
+    BuildError, CreateContext, DeviceOf, Frame, InputShapes, NoParams, NoPorts, OutputShapes, Pass, PlanContext, PortError, Ports,
+    RasterDescription, RasterPipeline, RunError, Specialisation,
 };
 use lobelia_scene::device::GpuScene;
 use lobelia_shaders::Source;
@@ -41,7 +41,11 @@ impl Pass for GBufferPass {
     fn specialise(context: &PlanContext<'_, Self>, _: &InputShapes<Self>) -> Vec<Specialisation> {
         let mut flags = SurfaceFlags::of(context.traits).specialisations();
         let mask = context.traits.alpha_mask;
-        flags.push(Specialisation::new("ALPHA_MASK", mask, if mask { "a material is cut out by alpha" } else { "no material is cut out by alpha" }));
+        flags.push(Specialisation::new(
+            "ALPHA_MASK",
+            mask,
+            if mask { "a material is cut out by alpha" } else { "no material is cut out by alpha" },
+        ));
         flags
     }
 
@@ -88,15 +92,18 @@ impl Pass for GBufferPass {
         let out = &outputs.gbuffer;
         let optional = [&out.specular, &out.geometric_normal, &out.emissive].map(|part| part.as_ref().map(|part| part.view().clone()));
         let [specular, geometric_normal, emissive] = optional;
-        Ok(Bindings { group, depth: out.depth.view().clone(), colors: [Some(out.core.view().clone()), specular, geometric_normal, emissive] })
+        Ok(Bindings {
+            group,
+            depth: out.depth.view().clone(),
+            colors: [Some(out.core.view().clone()), specular, geometric_normal, emissive],
+        })
     }
 
     fn record(&mut self, frame: &mut Frame<'_>, world: &DeviceOf<Self>, bindings: &Bindings) -> Result<(), RunError> {
         let clear = wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: wgpu::StoreOp::Store };
-        let colors = bindings
-            .colors
-            .each_ref()
-            .map(|view| view.as_ref().map(|view| wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops: clear }));
+        let colors = bindings.colors.each_ref().map(|view| {
+            view.as_ref().map(|view| wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops: clear })
+        });
         let depth = wgpu::RenderPassDepthStencilAttachment {
             view: &bindings.depth,
             depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),

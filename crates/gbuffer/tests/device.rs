@@ -137,7 +137,8 @@ impl Drawn {
 
     /// Through the pixel's centre; its part along the view direction is 1.
     fn ray(&self, x: u32, y: u32) -> DVec3 {
-        let ndc = DVec2::new(2.0 * (f64::from(x) + 0.5) / f64::from(EXTENT[0]) - 1.0, 1.0 - 2.0 * (f64::from(y) + 0.5) / f64::from(EXTENT[1]));
+        let ndc =
+            DVec2::new(2.0 * (f64::from(x) + 0.5) / f64::from(EXTENT[0]) - 1.0, 1.0 - 2.0 * (f64::from(y) + 0.5) / f64::from(EXTENT[1]));
         self.view.forward.as_dvec3() + self.view.right.as_dvec3() * ndc.x + self.view.up.as_dvec3() * ndc.y
     }
 }
@@ -169,8 +170,14 @@ fn without_emission_the_pass_is_left_out_with_its_reason() {
 #[test]
 fn a_square_lies_where_it_is_and_has_its_material() {
     let Some(gpu) = gpu() else { return };
-    let material =
-        Material { base_color: Vec3::new(0.9, 0.25, 0.04), roughness: 0.35, metallic: 0.6, specular: 0.8, emissive: Vec3::new(3.0, 0.5, 40.0), ..Material::default() };
+    let material = Material {
+        base_color: Vec3::new(0.9, 0.25, 0.04),
+        roughness: 0.35,
+        metallic: 0.6,
+        specular: 0.8,
+        emissive: Vec3::new(3.0, 0.5, 40.0),
+        ..Material::default()
+    };
     let slope = DMat4::from_rotation_y(0.5);
     let origin = scene(vec![material.clone()], vec![(square(0), slope)]).origin();
     // The front, the back, and the front again as the back of a mirror image.

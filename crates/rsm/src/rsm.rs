@@ -3,8 +3,8 @@
 use crate::faces;
 use lobelia_frame::{ReflectiveShadowMap, ReflectiveShadowMapShape, SceneWorld, SurfaceFlags, SurfaceFormats};
 use lobelia_graph::{
-    BuildError, CreateContext, DeviceOf, Frame, InputShapes, Need, NoPorts, OutputShapes, Pass, PlanContext, PortError, Ports, RasterDescription,
-    RasterPipeline, RunError, Specialisation, TraitsOf,
+    BuildError, CreateContext, DeviceOf, Frame, InputShapes, Need, NoPorts, OutputShapes, Pass, PlanContext, PortError, Ports,
+    RasterDescription, RasterPipeline, RunError, Specialisation, TraitsOf,
 };
 use lobelia_scene::device::GpuScene;
 use lobelia_shaders::Source;
@@ -77,7 +77,11 @@ impl Pass for RsmPass {
         let mut flags = SurfaceFlags::of(context.traits).specialisations();
         flags.retain(|flag| flag.flag != "EMISSIVE");
         let mask = context.traits.alpha_mask;
-        flags.push(Specialisation::new("ALPHA_MASK", mask, if mask { "a material is cut out by alpha" } else { "no material is cut out by alpha" }));
+        flags.push(Specialisation::new(
+            "ALPHA_MASK",
+            mask,
+            if mask { "a material is cut out by alpha" } else { "no material is cut out by alpha" },
+        ));
         flags
     }
 
@@ -167,10 +171,9 @@ impl Pass for RsmPass {
         frame.encoder().copy_buffer_to_buffer(&self.described, 0, &bindings.descriptions, 0, self.described.size());
         let clear = wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: wgpu::StoreOp::Store };
         for face in &bindings.faces {
-            let colors = face
-                .colors
-                .each_ref()
-                .map(|view| view.as_ref().map(|view| wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops: clear }));
+            let colors = face.colors.each_ref().map(|view| {
+                view.as_ref().map(|view| wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops: clear })
+            });
             let depth = wgpu::RenderPassDepthStencilAttachment {
                 view: &face.depth,
                 depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),

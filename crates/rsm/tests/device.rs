@@ -231,7 +231,10 @@ impl Map {
 fn cone(inner: f64, outer: f64) -> f64 {
     const STEPS: usize = 200_000;
     let step = outer / STEPS as f64;
-    (0..STEPS).map(|index| (index as f64 + 0.5) * step).map(|angle| spot_falloff(angle.cos(), inner, outer) * TAU * angle.sin() * step).sum()
+    (0..STEPS)
+        .map(|index| (index as f64 + 0.5) * step)
+        .map(|angle| spot_falloff(angle.cos(), inner, outer) * TAU * angle.sin() * step)
+        .sum()
 }
 
 fn close(found: DVec3, expected: DVec3, relative: f64) {
@@ -385,7 +388,8 @@ fn faces_follow_an_animated_light() {
     let Some(gpu) = gpu() else { return };
     let _turn = turn();
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR"));
-    let floats = [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, -1.0, /* times */ 0.0, 1.0, /* places */ 0.0, 2.0, 0.0, 3.0, 2.0, 1.0];
+    let floats =
+        [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, -1.0, /* times */ 0.0, 1.0, /* places */ 0.0, 2.0, 0.0, 3.0, 2.0, 1.0];
     std::fs::write(folder.join("moving.bin"), bytemuck::cast_slice(&floats)).unwrap();
     let text = r#"{
         "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}],
