@@ -1,6 +1,6 @@
 // Radiance to display colours.
 
-#import lobelia::tonemap::{MAX_INPUT, aces, agx, srgb_encode}
+#import lobelia::tonemap::{aces, agx, srgb_encode}
 
 struct Settings {
     // 2^stops.
@@ -19,7 +19,8 @@ fn tonemap(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= textureDimensions(picture)) {
         return;
     }
-    let exposed = min(textureLoad(radiance, id.xy, 0).rgb * settings.exposure, vec3f(MAX_INPUT));
+    // At most 65504 * 2^32, far from overflow; the curves cut off what is whiter than white.
+    let exposed = textureLoad(radiance, id.xy, 0).rgb * settings.exposure;
 #if CURVE == 1
     let mapped = aces(exposed);
 #else if CURVE == 2
