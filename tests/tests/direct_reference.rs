@@ -109,11 +109,10 @@ fn gbuffer_errors(setup: &Setup, shared: &Path) -> Vec<[f64; 2]> {
     rendering.run(&mut |_| true).unwrap();
     let parts = rendering.runner().read(rendering.gpu(), "gbuffer.gbuffer").unwrap();
     let texture = |name: &str| {
-        let found = parts.iter().find_map(|(part, data)| match data {
+        parts.iter().find_map(|(part, data)| match data {
             PartData::Texture(layers) if part.name == name => Some(layers[0].clone()),
             _ => None,
-        });
-        found
+        })
     };
     let depth = texture("depth").unwrap().to_f32_rgba();
     // The reference shows the interpolated normal, which is apart only where there are normal maps.
