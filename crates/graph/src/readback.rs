@@ -3,6 +3,9 @@
 use crate::{error::GpuError, gpu::Gpu};
 use half::f16;
 
+/// Longest wait for an answer after the device's work is done.
+const ANSWER: std::time::Duration = std::time::Duration::from_secs(30);
+
 /// One image of a texture, rows tightly packed, row 0 first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TextureData {
@@ -97,7 +100,8 @@ impl Gpu {
             let _ = sender.send(mapped);
         });
         self.wait()?;
-        match receiver.try_recv() {
+        // Another thread that polls the same device may be the one that answers, a little after this one's wait is over.
+        match receiver.recv_timeout(ANSWER) {
             Ok(Ok(())) => {}
             Ok(Err(error)) => return Err(GpuError::ReadBack(error.to_string())),
             Err(_) => return Err(GpuError::ReadBack("the device did not answer".into())),

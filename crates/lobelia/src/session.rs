@@ -1,6 +1,6 @@
 //! From scene and graph to a picture.
 
-use glam::Vec2;
+use glam::DVec2;
 use lobelia_frame::{DisplayImage, Radiance, SceneWorld};
 use lobelia_graph::{FrameReport, Gpu, GpuError, GpuOptions, Plan, PlanOptions, Problems, Resource, RunError, RunOptions, Runner, Wired};
 use lobelia_measure::Image;
@@ -215,6 +215,7 @@ impl Session {
             sums: Vec::new(),
             reports: Vec::new(),
             view: None,
+            centre: mean_of_spread(shot.samples),
         })
     }
 }
@@ -248,15 +249,18 @@ pub struct Rendering<'a> {
     sums: Vec<Sum>,
     reports: Vec<FrameReport>,
     view: Option<ViewUniform>,
+    /// Taken from sub-pixel positions to centre them.
+    centre: DVec2,
 }
 
-/// Sub-pixel offsets of sample `index`: the R2 sequence (Roberts 2018), centred. A single sample lies in the pixel's centre.
-fn jitter(index: u32, samples: u32) -> Vec2 {
-    if samples <= 1 {
-        return Vec2::ZERO;
-    }
-    let step = |generator: f64| ((0.5 + generator * f64::from(index + 1)).fract() - 0.5) as f32;
-    Vec2::new(step(0.754_877_666_246_692_7), step(0.569_840_290_998_053_3))
+/// Point `index` of the R2 sequence (Roberts 2018), in [0, 1)^2.
+fn spread(index: u32) -> DVec2 {
+    (DVec2::new(0.754_877_666_246_692_7, 0.569_840_290_998_053_3) * f64::from(index + 1)).fract()
+}
+
+/// Mean of the first `samples` points. Sub-pixel offsets are points minus this, so that their mean is the pixel's centre; a single sample lies there.
+fn mean_of_spread(samples: u32) -> DVec2 {
+    (0..samples).map(spread).sum::<DVec2>() / f64::from(samples.max(1))
 }
 
 impl Rendering<'_> {
@@ -309,7 +313,7 @@ impl Rendering<'_> {
             return Err(RunError::Stopped.into());
         }
         let session = &*self.session;
-        let jitter = jitter(sample, self.shot.samples);
+        let jitter = (spread(sample) - self.centre).as_vec2();
         // Every sample has its own random numbers; the first has the seed itself.
         let seed = self.shot.seed.wrapping_add(sample.wrapping_mul(0x9e37_79b9));
         let index = frame.wrapping_mul(self.shot.samples).wrapping_add(sample);
@@ -372,5 +376,24 @@ impl Rendering<'_> {
             display = Some(self.runner.read_image(&self.session.gpu, &self.output)?.bytes);
         }
         Ok(Picture { extent: self.shot.extent, pixels: image.pixels, display })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{mean_of_spread, spread};
+    use glam::Vec2;
+
+    #[test]
+    fn samples_are_centred_and_spread() {
+        let of = |samples: u32| -> Vec<Vec2> { (0..samples).map(|index| (spread(index) - mean_of_spread(samples)).as_vec2()).collect() };
+        assert_eq!(of(1), [Vec2::ZERO]);
+        for samples in [2, 3, 16, 64] {
+            let offsets = of(samples);
+            let mean = offsets.iter().sum::<Vec2>() / samples as f32;
+            assert!(mean.length() < 1e-6, "{samples}: {mean}");
+            assert!(offsets.iter().all(|offset| offset.abs().max_element() < 0.75), "{offsets:?}");
+            assert!(offsets.iter().any(|offset| offset.x > 0.1) && offsets.iter().any(|offset| offset.y < -0.1));
+        }
     }
 }
