@@ -10,8 +10,8 @@ fn segment_hits_box(origin: vec3f, inverse: vec3f, box_min: vec3f, box_max: vec3
     let far = max(a, b);
     let enter = max(max(near.x, near.y), max(near.z, 0.0));
     let leave = min(min(far.x, far.y), min(far.z, 1.0));
-    // A hair of slack, for rounding of the products: flat boxes must not be missed.
-    return enter <= leave * 1.0000004 + 1e-30;
+    // Slack for the rounding of differences, quotients (2.5 units in the last place, says Vulkan) and products: no box that holds a hit may be missed.
+    return enter <= leave * 1.000001 + 1e-30;
 }
 
 // Whether the segment meets the triangle (corner and two edges) at 0 < t < 1 (Moeller and Trumbore 1997); both sides count.
@@ -26,7 +26,9 @@ fn segment_hits_triangle(origin: vec3f, direction: vec3f, corner: vec3f, edge_b:
     let u = dot(s, p) * sign;
     let v = dot(direction, q) * sign;
     let t = dot(edge_c, q) * sign;
-    return size > 0.0 && u >= 0.0 && v >= 0.0 && u + v <= size && t > 0.0 && t < size;
+    // A hair wider than it is, or rounding would open a gap between triangles that share an edge.
+    let slack = 1e-6 * size;
+    return size > 0.0 && u >= -slack && v >= -slack && u + v <= size + slack && t > 0.0 && t < size;
 }
 
 fn safe_inverse(direction: vec3f) -> vec3f {

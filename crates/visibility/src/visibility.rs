@@ -3,8 +3,8 @@
 use crate::hierarchy::Hierarchy;
 use lobelia_frame::{GBuffer, LightVisibility, LightVisibilityShape, SceneWorld, VirtualLights};
 use lobelia_graph::{
-    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, Pass, PlanContext, PortError, Ports, RunError,
-    Specialisation, TraitsOf, WorkRate,
+    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, Pass, PlanContext, PortError, Ports,
+    RunError, Specialisation, TraitsOf, WorkRate,
 };
 use lobelia_scene::Scene;
 use lobelia_shaders::Source;
@@ -95,12 +95,20 @@ impl Pass for VisibilityPass {
     }
 
     fn shape(context: &PlanContext<'_, Self>, inputs: &InputShapes<Self>) -> Result<OutputShapes<Self>, PortError> {
-        let shape = LightVisibilityShape { extent: inputs.gbuffer.extent, lights: inputs.lights.count, interleave: context.params.interleave };
+        let shape =
+            LightVisibilityShape { extent: inputs.gbuffer.extent, lights: inputs.lights.count, interleave: context.params.interleave };
         let pixels = u64::from(shape.extent[0]) * u64::from(shape.extent[1]);
         let bytes = pixels * 4 * u64::from(shape.words_per_pixel());
         if bytes > MAX_BYTES || shape.chunks() > LightVisibility::MAX_CHUNKS {
-            let message = format!("{} lights seen from {pixels} pixels take {} MiB; at most {} MiB are given", shape.lights, bytes >> 20, MAX_BYTES >> 20);
-            return Err(PortError::new(message).help("use fewer lights or a smaller picture, or raise `interleave` here and in the gathering pass"));
+            let message = format!(
+                "{} lights seen from {pixels} pixels take {} MiB; at most {} MiB are given",
+                shape.lights,
+                bytes >> 20,
+                MAX_BYTES >> 20
+            );
+            return Err(
+                PortError::new(message).help("use fewer lights or a smaller picture, or raise `interleave` here and in the gathering pass")
+            );
         }
         Ok(OutputsShapes { visibility: shape })
     }
@@ -109,21 +117,25 @@ impl Pass for VisibilityPass {
         let source = Source { path: "crates/visibility/src/visibility.wgsl", text: include_str!("visibility.wgsl") };
         let pipeline = context.gpu.compute_pipeline(context.name, source, "trace", context.flags)?;
         let hierarchy = Hierarchy::build(&context.world.scene.triangles());
-        let storage = |label: &str, rows: &[[f32; 4]]| -> Result<wgpu::Buffer, BuildError> {
-            let size = (rows.len() * 16) as u64;
+        let storage = |label: &str, bytes: &[u8]| -> Result<wgpu::Buffer, BuildError> {
+            let size = bytes.len() as u64;
             if size > LightVisibilityShape::CHUNK_BYTES {
-                return Err(BuildError::Other(format!("the {label} of the scene's hierarchy take {} MiB; at most 128 can be bound", size >> 20)));
+                return Err(BuildError::Other(format!(
+                    "the {label} of the scene's hierarchy take {} MiB; at most 128 can be bound",
+                    size >> 20
+                )));
             }
             // An animated scene is rebuilt, and its tree may have more nodes; there are never more than two per triangle.
             let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
-            let buffer = context.gpu.device().create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false });
-            context.gpu.queue().write_buffer(&buffer, 0, bytemuck::cast_slice(rows));
+            let buffer =
+                context.gpu.device().create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false });
+            context.gpu.queue().write_buffer(&buffer, 0, bytes);
             Ok(buffer)
         };
         let most_nodes = 4 * context.traits.triangles.max(1);
         let mut padded = hierarchy.nodes.clone();
         if context.traits.animated {
-            padded.resize(most_nodes.max(padded.len()), [0.0; 4]);
+            padded.resize(most_nodes.max(padded.len()), [0; 4]);
         }
         let settings = context.gpu.device().create_buffer(&wgpu::BufferDescriptor {
             label: Some("visibility settings"),
@@ -136,8 +148,8 @@ impl Pass for VisibilityPass {
         Ok(Self {
             pipeline,
             settings,
-            nodes: storage("nodes", &padded)?,
-            triangles: storage("triangles", &hierarchy.triangles)?,
+            nodes: storage("nodes", bytemuck::cast_slice(&padded))?,
+            triangles: storage("triangles", bytemuck::cast_slice(&hierarchy.triangles))?,
             version: context.world.scene.geometry_version(),
             fixed,
             extent: context.inputs.gbuffer.extent,
@@ -205,8 +217,8 @@ impl VisibilityPass {
             return Ok(());
         }
         let hierarchy = Hierarchy::build(&scene.triangles());
-        let fits = |rows: &[[f32; 4]], buffer: &wgpu::Buffer| (rows.len() * 16) as u64 <= buffer.size();
-        if !fits(&hierarchy.nodes, &self.nodes) || !fits(&hierarchy.triangles, &self.triangles) {
+        let fits = |rows: usize, buffer: &wgpu::Buffer| (rows * 16) as u64 <= buffer.size();
+        if !fits(hierarchy.nodes.len(), &self.nodes) || !fits(hierarchy.triangles.len(), &self.triangles) {
             return Err(RunError::Pass { pass: frame.pass_name().into(), message: "the scene grew after the graph was created".into() });
         }
         frame.write_buffer(&self.nodes, bytemuck::cast_slice(&hierarchy.nodes));

@@ -26,7 +26,8 @@ struct Range {
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<uniform> settings: Settings;
 @group(0) @binding(2) var<uniform> range: Range;
-@group(0) @binding(3) var<storage, read> nodes: array<vec4f>;
+// Words, not floats: links and counts are small integers, which a device may take for denormal floats and flush.
+@group(0) @binding(3) var<storage, read> nodes: array<vec4u>;
 @group(0) @binding(4) var<storage, read> triangles: array<vec4f>;
 @group(0) @binding(5) var<storage, read> virtual_lights: array<VirtualLight>;
 @group(0) @binding(6) var gbuffer_depth: texture_depth_2d;
@@ -60,17 +61,16 @@ fn blocked(start: vec3f, end: vec3f) -> bool {
     while index < settings.node_count {
         let low = nodes[2u * index];
         let high = nodes[2u * index + 1u];
-        if segment_hits_box(start, inverse, low.xyz, high.xyz) {
-            let leaf = bitcast<u32>(high.w);
-            let first = leaf / 16u;
-            for (var triangle = first; triangle < first + (leaf & 15u); triangle++) {
+        if segment_hits_box(start, inverse, bitcast<vec3f>(low.xyz), bitcast<vec3f>(high.xyz)) {
+            let first = high.w / 16u;
+            for (var triangle = first; triangle < first + (high.w & 15u); triangle++) {
                 if segment_hits_triangle(start, direction, triangles[3u * triangle].xyz, triangles[3u * triangle + 1u].xyz, triangles[3u * triangle + 2u].xyz) {
                     return true;
                 }
             }
             index += 1u;
         } else {
-            index = bitcast<u32>(low.w);
+            index = low.w;
         }
     }
     return false;
