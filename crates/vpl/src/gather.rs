@@ -3,8 +3,8 @@
 use crate::reflectance_flags;
 use lobelia_frame::{GBuffer, ImageShape, LightVisibility, LightVisibilityShape, Radiance, SceneWorld, VirtualLights};
 use lobelia_graph::{
-    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OrNone, OutputShapes, Params, Pass, PlanContext, PortError, Ports,
-    RunError, Specialisation, TraitsOf, WorkRate,
+    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OrNone, OutputShapes, Params, Pass, PlanContext,
+    PortError, Ports, RunError, Specialisation, TraitsOf, WorkRate,
 };
 use lobelia_shaders::Source;
 use serde::{Deserialize, Serialize};
@@ -98,7 +98,11 @@ impl Pass for VplGatherPass {
         let flags = inputs.gbuffer.flags;
         let mut found = reflectance_flags(flags.specular, flags.normal_map, context.traits.ndf);
         let visibility = inputs.visibility.is_some();
-        found.push(Specialisation::new("VISIBILITY", visibility, if visibility { "visibility is connected" } else { "no visibility is connected" }));
+        found.push(Specialisation::new(
+            "VISIBILITY",
+            visibility,
+            if visibility { "visibility is connected" } else { "no visibility is connected" },
+        ));
         let k = context.params.interleave;
         found.push(Specialisation::new("INTERLEAVED", k > 1, format!("interleave is {k}")));
         found
@@ -108,7 +112,13 @@ impl Pass for VplGatherPass {
         let extent = inputs.gbuffer.extent;
         let pixels = u64::from(extent[0]) * u64::from(extent[1]);
         if pixels * 16 > MAX_BINDING {
-            let message = format!("a picture of {} x {} pixels needs {} MiB for its sums; at most {} MiB can be bound", extent[0], extent[1], (pixels * 16) >> 20, MAX_BINDING >> 20);
+            let message = format!(
+                "a picture of {} x {} pixels needs {} MiB for its sums; at most {} MiB can be bound",
+                extent[0],
+                extent[1],
+                (pixels * 16) >> 20,
+                MAX_BINDING >> 20
+            );
             return Err(PortError::at("gbuffer", message).help("render a smaller picture"));
         }
         if let Some(visibility) = &inputs.visibility {
@@ -121,7 +131,12 @@ impl Pass for VplGatherPass {
         let source = Source { path: "crates/vpl/src/gather.wgsl", text: include_str!("gather.wgsl") };
         let pipeline = |entry: &str| context.gpu.compute_pipeline(context.name, source, entry, context.flags);
         let buffer = |label: &str, bytes: u64, usage: wgpu::BufferUsages| {
-            context.gpu.device().create_buffer(&wgpu::BufferDescriptor { label: Some(label), size: bytes, usage, mapped_at_creation: false })
+            context.gpu.device().create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size: bytes,
+                usage,
+                mapped_at_creation: false,
+            })
         };
         let (extent, interleave) = (context.inputs.gbuffer.extent, context.params.interleave);
         let count = context.inputs.lights.count;
@@ -165,7 +180,12 @@ impl Pass for VplGatherPass {
         };
         let range_buffer = || {
             let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
-            context.gpu.device().create_buffer(&wgpu::BufferDescriptor { label: Some("light range"), size: 16, usage, mapped_at_creation: false })
+            context.gpu.device().create_buffer(&wgpu::BufferDescriptor {
+                label: Some("light range"),
+                size: 16,
+                usage,
+                mapped_at_creation: false,
+            })
         };
         let mut chunks = Vec::new();
         match &inputs.visibility {
@@ -178,7 +198,11 @@ impl Pass for VplGatherPass {
                 let per_chunk = visibility.shape.words_per_chunk();
                 for (index, buffer) in visibility.chunks.iter().enumerate() {
                     let first = index as u32 * per_chunk;
-                    let words = if visibility.chunks.len() == 1 { 0..self.words } else { first..first + visibility.shape.words_in_chunk(index as u32) };
+                    let words = if visibility.chunks.len() == 1 {
+                        0..self.words
+                    } else {
+                        first..first + visibility.shape.words_in_chunk(index as u32)
+                    };
                     let range = range_buffer();
                     let group = group(&self.gather, &range, Some(buffer))?;
                     chunks.push(Chunk { words, range, group });

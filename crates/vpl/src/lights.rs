@@ -3,8 +3,8 @@
 use crate::reflectance_flags;
 use lobelia_frame::{ReflectiveShadowMap, SceneWorld, VirtualLights, VirtualLightsShape};
 use lobelia_graph::{
-    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, Params, Pass, PlanContext, PortError, Ports, RunError,
-    Specialisation, TraitsOf,
+    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, Params, Pass, PlanContext, PortError,
+    Ports, RunError, Specialisation, TraitsOf,
 };
 use lobelia_shaders::Source;
 use serde::{Deserialize, Serialize};
@@ -95,7 +95,12 @@ impl Pass for VplLightsPass {
         let pipeline = |entry: &str| context.gpu.compute_pipeline(context.name, source, entry, context.flags);
         let rsm = &context.inputs.rsm;
         let buffer = |label: &str, bytes: u64, usage: wgpu::BufferUsages| {
-            context.gpu.device().create_buffer(&wgpu::BufferDescriptor { label: Some(label), size: bytes, usage, mapped_at_creation: false })
+            context.gpu.device().create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size: bytes,
+                usage,
+                mapped_at_creation: false,
+            })
         };
         let rows = u64::from(rsm.resolution) * u64::from(rsm.faces);
         Ok(Self {
