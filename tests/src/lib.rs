@@ -48,7 +48,8 @@ impl Render<'_> {
         let wired = graph.wire(&lobelia::registry(), &variants, &overrides).map_err(|error| error.to_string())?;
         let mut scene = lobelia::scene::Scene::load(self.scene).map_err(|error| error.to_string())?;
         scene.ndf = self.ndf;
-        let gpu = lobelia::graph::Gpu::new(&lobelia::graph::GpuOptions { adapter: None, baseline: true }).map_err(|error| error.to_string())?;
+        let gpu =
+            lobelia::graph::Gpu::new(&lobelia::graph::GpuOptions { adapter: None, baseline: true }).map_err(|error| error.to_string())?;
         let mut session = Session::with(gpu, scene, 0.0).map_err(|error| error.to_string())?;
         let mut shot = self.shot.clone();
         shot.keep.push(name.to_owned());

@@ -11,7 +11,10 @@ use std::{
 fn program() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(|| {
-        let built = Command::new(env!("CARGO")).args(["build", "--quiet", "-p", "lobelia-lobelia", "--bin", "lobelia"]).current_dir(lobelia_tests::root()).status();
+        let built = Command::new(env!("CARGO"))
+            .args(["build", "--quiet", "-p", "lobelia-lobelia", "--bin", "lobelia"])
+            .current_dir(lobelia_tests::root())
+            .status();
         assert!(built.unwrap().success());
         let folder = std::env::current_exe().unwrap().parent().and_then(Path::parent).unwrap().to_owned();
         folder.join(format!("lobelia{}", std::env::consts::EXE_SUFFIX))
@@ -77,51 +80,143 @@ fn rows() -> Vec<Row> {
         on_graph("cut off", "(passes: {\"a\": gbuffer()".into(), &["g.ron:1:"]),
         on_arguments("missing graph", "check missing.ron", &["missing.ron", "cannot read the graph"]),
         on_arguments("folder as graph", "check .", &["cannot read the graph"]),
-        on_graph("unknown section", "(passes: {}, outputs: \"a\")".into(), &["g.ron:1:14", "no section `outputs`", "did you mean `output`?"]),
+        on_graph(
+            "unknown section",
+            "(passes: {}, outputs: \"a\")".into(),
+            &["g.ron:1:14", "no section `outputs`", "did you mean `output`?"],
+        ),
         on_graph("no passes", "(output: \"a.b\")".into(), &["the graph has no `passes`"]),
         on_graph("no output", "(passes: {\"a\": gbuffer()})".into(), &["does not say what its `output` is"]),
-        on_graph("duplicate section", "(passes: {}, passes: {}, output: \"a\")".into(), &["duplicate section `passes`", "first written here"]),
+        on_graph(
+            "duplicate section",
+            "(passes: {}, passes: {}, output: \"a\")".into(),
+            &["duplicate section `passes`", "first written here"],
+        ),
         // Passes and parameters.
-        on_passes("unknown kind", &spoiled("gbuffer()", "gbufer()"), &["g.ron:3:16", "pass `gbuffer`", "no kind of pass is called `gbufer`", "did you mean `gbuffer`?"]),
+        on_passes(
+            "unknown kind",
+            &spoiled("gbuffer()", "gbufer()"),
+            &["g.ron:3:16", "pass `gbuffer`", "no kind of pass is called `gbufer`", "did you mean `gbuffer`?"],
+        ),
         on_passes("no kind", &spoiled("gbuffer()", "(size: 2)"), &["g.ron:3:16", "pass `gbuffer` has no kind"]),
-        on_passes("unknown parameter", &spoiled("resolution: 64", "resolutoin: 64"), &["g.ron:3:38", "(rsm) has no parameter `resolutoin`", "did you mean `resolution`?"]),
+        on_passes(
+            "unknown parameter",
+            &spoiled("resolution: 64", "resolutoin: 64"),
+            &["g.ron:3:38", "(rsm) has no parameter `resolutoin`", "did you mean `resolution`?"],
+        ),
         on_passes("parameter of a pass without any", &spoiled("gbuffer()", "gbuffer(size: 3)"), &["`gbuffer` has no parameters"]),
-        on_passes("wrong type", &spoiled("resolution: 64", "resolution: \"big\""), &["g.ron:3:50", "`resolution` cannot be \"big\"", "texels", "[16, 4096]"]),
+        on_passes(
+            "wrong type",
+            &spoiled("resolution: 64", "resolution: \"big\""),
+            &["g.ron:3:50", "`resolution` cannot be \"big\"", "texels", "[16, 4096]"],
+        ),
         on_passes("fraction for an integer", &spoiled("count: 64", "count: 1.5"), &["`count` cannot be 1.5"]),
-        on_passes("out of range", &spoiled("resolution: 64", "resolution: 8"), &["g.ron:3:50", "`resolution` is 8, but must lie in [16, 4096]"]),
+        on_passes(
+            "out of range",
+            &spoiled("resolution: 64", "resolution: 8"),
+            &["g.ron:3:50", "`resolution` is 8, but must lie in [16, 4096]"],
+        ),
         on_passes("negative", &spoiled("count: 64", "count: -3"), &["`count` cannot be -3"]),
         on_passes("nan", &spoiled("tonemap(", "tonemap(exposure: NaN, "), &["`exposure` is NaN, but must lie in [-32.0, 32.0]"]),
         on_passes("infinity", &spoiled("vpl_gather()", "vpl_gather(clamp: inf)"), &["`clamp` is inf"]),
         on_passes("unknown choice", &spoiled("tonemap(", "tonemap(curve: filmic, "), &["`curve` cannot be filmic", "aces, agx or none"]),
         on_passes("duplicate pass", &with("\"gbuffer\": gbuffer(),"), &["duplicate pass `gbuffer`", "first written here"]),
-        on_passes("duplicate parameter", &spoiled("resolution: 64", "resolution: 64, resolution: 32"), &["duplicate parameter `resolution`"]),
+        on_passes(
+            "duplicate parameter",
+            &spoiled("resolution: 64", "resolution: 64, resolution: 32"),
+            &["duplicate parameter `resolution`"],
+        ),
         on_passes("positional parameter", &spoiled("rsm(resolution: 64)", "rsm(64)"), &["g.ron:3:"]),
         // Wiring.
-        on_passes("unknown port", &spoiled("{\"radiance\"", "{\"radience\""), &["pass `tonemap` (tonemap) has no input port `radience`", "did you mean `radiance`?"]),
-        on_passes("unknown source", &spoiled("\"sum.radiance\"", "\"som.radiance\""), &["port `radiance: Radiance`: there is no `som.radiance`", "did you mean `sum`?"]),
-        on_passes("unknown source port", &spoiled("\"sum.radiance\"", "\"sum.radiant\""), &["there is no `sum.radiant`", "did you mean `sum.radiance`?"]),
-        on_passes("wrong type on an edge", &spoiled("\"sum.radiance\"", "\"gbuffer.gbuffer\""), &["g.ron:4:", "port `radiance`: expected Radiance, but `gbuffer.gbuffer` is GBuffer", "`sum.radiance`"]),
-        on_passes("required and empty", &spoiled("\"sum.radiance\"", "[]"), &["port `radiance: Radiance`", "is required and cannot be left empty"]),
-        on_passes("two for one", &spoiled("\"sum.radiance\"", "[\"sum.radiance\", \"direct.radiance\"]"), &["takes one producer, not several"]),
-        on_passes("ambiguous", &spoiled("tonemap(from: {\"radiance\": \"sum.radiance\"})", "tonemap()"), &["port `radiance: Radiance` is ambiguous", "`direct.radiance`, `indirect.radiance`, `sum.radiance`", "from: {\"radiance\": \"direct.radiance\"}"]),
-        on_passes("nothing makes it", &spoiled("\"gbuffer\": gbuffer(), ", ""), &["is not connected: nothing in this graph makes a GBuffer", "add a pass that makes a GBuffer: gbuffer"]),
-        on_passes("cycle", &with("\"a\": compose(from: {\"terms\": \"b\"}), \"b\": compose(from: {\"terms\": \"a\"}),"), &["passes `a`, `b` wait for each other in a cycle", "history"]),
+        on_passes(
+            "unknown port",
+            &spoiled("{\"radiance\"", "{\"radience\""),
+            &["pass `tonemap` (tonemap) has no input port `radience`", "did you mean `radiance`?"],
+        ),
+        on_passes(
+            "unknown source",
+            &spoiled("\"sum.radiance\"", "\"som.radiance\""),
+            &["port `radiance: Radiance`: there is no `som.radiance`", "did you mean `sum`?"],
+        ),
+        on_passes(
+            "unknown source port",
+            &spoiled("\"sum.radiance\"", "\"sum.radiant\""),
+            &["there is no `sum.radiant`", "did you mean `sum.radiance`?"],
+        ),
+        on_passes(
+            "wrong type on an edge",
+            &spoiled("\"sum.radiance\"", "\"gbuffer.gbuffer\""),
+            &["g.ron:4:", "port `radiance`: expected Radiance, but `gbuffer.gbuffer` is GBuffer", "`sum.radiance`"],
+        ),
+        on_passes(
+            "required and empty",
+            &spoiled("\"sum.radiance\"", "[]"),
+            &["port `radiance: Radiance`", "is required and cannot be left empty"],
+        ),
+        on_passes(
+            "two for one",
+            &spoiled("\"sum.radiance\"", "[\"sum.radiance\", \"direct.radiance\"]"),
+            &["takes one producer, not several"],
+        ),
+        on_passes(
+            "ambiguous",
+            &spoiled("tonemap(from: {\"radiance\": \"sum.radiance\"})", "tonemap()"),
+            &[
+                "port `radiance: Radiance` is ambiguous",
+                "`direct.radiance`, `indirect.radiance`, `sum.radiance`",
+                "from: {\"radiance\": \"direct.radiance\"}",
+            ],
+        ),
+        on_passes(
+            "nothing makes it",
+            &spoiled("\"gbuffer\": gbuffer(), ", ""),
+            &["is not connected: nothing in this graph makes a GBuffer", "add a pass that makes a GBuffer: gbuffer"],
+        ),
+        on_passes(
+            "cycle",
+            &with("\"a\": compose(from: {\"terms\": \"b\"}), \"b\": compose(from: {\"terms\": \"a\"}),"),
+            &["passes `a`, `b` wait for each other in a cycle", "history"],
+        ),
         on_passes("self", &with("\"a\": compose(from: {\"terms\": \"a\"}),"), &["pass `a` reads its own output"]),
-        on_graph("unknown output", graph(GOOD).replace("tonemap.image", "tonemap.imaje"), &["output: there is no `tonemap.imaje`", "did you mean `tonemap.image`?"]),
+        on_graph(
+            "unknown output",
+            graph(GOOD).replace("tonemap.image", "tonemap.imaje"),
+            &["output: there is no `tonemap.imaje`", "did you mean `tonemap.image`?"],
+        ),
         on_graph("unknown output pass", graph(GOOD).replace("tonemap.image", "tonmap.image"), &["did you mean `tonemap`?"]),
-        on_passes("several at once", &spoiled("gbuffer()", "gbufer()").replace("resolution: 64", "resolution: 1"), &["gbufer", "`resolution` is 1", "2 problems"]),
+        on_passes(
+            "several at once",
+            &spoiled("gbuffer()", "gbufer()").replace("resolution: 64", "resolution: 1"),
+            &["gbufer", "`resolution` is 1", "2 problems"],
+        ),
         // Variants.
         on_graph(
             "variant of no pass",
             graph(GOOD).replace("output:", "variants: {\"v\": {\"shadow\": rsm()}}, output:"),
             &["variant `v` names no pass: the graph has no `shadow` to replace"],
         ),
-        on_graph("mistake in a variant", graph(GOOD).replace("output:", "variants: {\"v\": {\"rsm\": rsm(resolution: 3)}}, output:"), &["`resolution` is 3"]),
-        on_graph("duplicate variant", graph(GOOD).replace("output:", "variants: {\"v\": {}, \"v\": {}}, output:"), &["duplicate variant `v`"]),
-        on_arguments("unknown variant", "explain GRAPHS/indirect.ron --variant no-visibilty", &["no variant is called `no-visibilty`", "did you mean `no-visibility`?"]),
+        on_graph(
+            "mistake in a variant",
+            graph(GOOD).replace("output:", "variants: {\"v\": {\"rsm\": rsm(resolution: 3)}}, output:"),
+            &["`resolution` is 3"],
+        ),
+        on_graph(
+            "duplicate variant",
+            graph(GOOD).replace("output:", "variants: {\"v\": {}, \"v\": {}}, output:"),
+            &["duplicate variant `v`"],
+        ),
+        on_arguments(
+            "unknown variant",
+            "explain GRAPHS/indirect.ron --variant no-visibilty",
+            &["no variant is called `no-visibilty`", "did you mean `no-visibility`?"],
+        ),
         // The command line.
         on_arguments("malformed --set", "explain g.ron --set lights=3", &["PASS.PARAM=VALUE"]),
-        on_arguments("--set of no pass", "explain g.ron --set light.count=3", &["--set light.count", "has no pass `light`", "did you mean `lights`?"]),
+        on_arguments(
+            "--set of no pass",
+            "explain g.ron --set light.count=3",
+            &["--set light.count", "has no pass `light`", "did you mean `lights`?"],
+        ),
         on_arguments("--set of no parameter", "explain g.ron --set lights.cuont=3", &["has no parameter `cuont`", "did you mean `count`?"]),
         on_arguments("--set of no value", "explain g.ron --set lights.count=many", &["`many` is not a value for it", "[1, 65536]"]),
         on_arguments("--set out of range", "explain g.ron --set lights.count=0", &["--set lights.count", "`count` is 0"]),
@@ -134,23 +229,51 @@ fn rows() -> Vec<Row> {
         on_arguments("unknown ending", "render g.ron -o a.jpg", &["a.jpg", ".png, .exr"]),
         on_arguments("missing folder", "render g.ron -o nowhere/a.png", &["nowhere/a.png", "does not exist"]),
         on_arguments("malformed --save", "render g.ron --save direct.radiance", &["PASS.PORT=FILE"]),
-        on_arguments("unknown --save", "render g.ron --save direct.radience=a.exr", &["there is no `direct.radience`", "did you mean `direct.radiance`?"]),
+        on_arguments(
+            "unknown --save",
+            "render g.ron --save direct.radience=a.exr",
+            &["there is no `direct.radience`", "did you mean `direct.radiance`?"],
+        ),
         on_arguments("wrong ending for a type", "render g.ron --save lights.lights=a.exr", &["a.exr", ".npz"]),
         on_arguments("unknown camera", "render g.ron --camera mian -o a.png", &["no camera is called `mian`", "did you mean `main`?"]),
         on_arguments("unknown pass to describe", "passes gbufer", &["no pass is called `gbufer`; did you mean `gbuffer`?"]),
         // Graph and scene together.
-        on_arguments("pruned output", "explain g.ron --scene unlit.gltf --keep direct.radiance", &["does not make `direct.radiance`: pass `direct` is left out because the scene has no point, spot or directional light"]),
-        on_arguments("interleaving that does not match", "explain g.ron --set visibility.interleave=4", &["pass `indirect` (vpl-gather), port `visibility`", "interleaved 4 x 4", "set interleave of the visibility pass to 1"]),
-        on_arguments("too many bits", "explain g.ron --set lights.count=65536 --size 4000x2000", &["pass `visibility`", "MiB", "fewer lights"]),
+        on_arguments(
+            "pruned output",
+            "explain g.ron --scene unlit.gltf --keep direct.radiance",
+            &["does not make `direct.radiance`: pass `direct` is left out because the scene has no point, spot or directional light"],
+        ),
+        on_arguments(
+            "interleaving that does not match",
+            "explain g.ron --set visibility.interleave=4",
+            &["pass `indirect` (vpl-gather), port `visibility`", "interleaved 4 x 4", "set interleave of the visibility pass to 1"],
+        ),
+        on_arguments(
+            "too many bits",
+            "explain g.ron --set lights.count=65536 --size 4000x2000",
+            &["pass `visibility`", "MiB", "fewer lights"],
+        ),
         // Scenes.
-        on_arguments("unknown builtin", "scene-info builtin:cornel-glossy", &["no built-in scene is called `cornel-glossy`", "did you mean `cornell-glossy`?"]),
+        on_arguments(
+            "unknown builtin",
+            "scene-info builtin:cornel-glossy",
+            &["no built-in scene is called `cornel-glossy`", "did you mean `cornell-glossy`?"],
+        ),
         on_arguments("missing scene", "scene-info nowhere.glb", &["nowhere.glb: cannot be read"]),
         on_arguments("unknown kind of scene", "scene-info g.obj", &["g.obj: not a scene", ".glb, .gltf or .ron"]),
         on_arguments("no glTF", "scene-info text.glb", &["text.glb", "glTF"]),
         on_scene("RON scene syntax", "(gltf: \"builtin:spheres\",\n  ndf: )", &["s.ron:2:"]),
         on_scene("RON scene field", "(gltf: \"builtin:spheres\", lihgts: {})", &["s.ron:1:", "lihgts", "did you mean `lights`?"]),
-        on_scene("RON scene material", "(gltf: \"builtin:cornell-glossy\",\n materials: {\"wite\": (roughness: 0.5)})", &["s.ron:2:", "no material is called `wite`", "did you mean `white`?"]),
-        on_scene("RON scene range", "(gltf: \"builtin:cornell-glossy\",\n materials: {\"white\": (roughness: 1.5)})", &["s.ron:2:", "roughness is 1.5, but must lie in [0, 1]"]),
+        on_scene(
+            "RON scene material",
+            "(gltf: \"builtin:cornell-glossy\",\n materials: {\"wite\": (roughness: 0.5)})",
+            &["s.ron:2:", "no material is called `wite`", "did you mean `white`?"],
+        ),
+        on_scene(
+            "RON scene range",
+            "(gltf: \"builtin:cornell-glossy\",\n materials: {\"white\": (roughness: 1.5)})",
+            &["s.ron:2:", "roughness is 1.5, but must lie in [0, 1]"],
+        ),
         on_scene("RON scene of nothing", "(gltf: \"nowhere.glb\")", &["nowhere.glb"]),
     ];
     rows.push(Row {
@@ -209,7 +332,14 @@ fn every_row_ends_in_its_message_and_exit_code() {
 fn good_input_is_good() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("g.ron"), graph(GOOD)).unwrap();
-    for arguments in ["check g.ron GRAPHS/direct.ron GRAPHS/indirect.ron --scene builtin:spheres", "explain g.ron", "passes", "passes vpl_gather", "scene-info builtin:spheres --json", "completions bash"] {
+    for arguments in [
+        "check g.ron GRAPHS/direct.ron GRAPHS/indirect.ron --scene builtin:spheres",
+        "explain g.ron",
+        "passes",
+        "passes vpl_gather",
+        "scene-info builtin:spheres --json",
+        "completions bash",
+    ] {
         let output = run(folder.path(), arguments);
         assert!(output.status.success(), "{arguments}: {}", String::from_utf8_lossy(&output.stderr));
         assert!(!output.stdout.is_empty(), "{arguments}");

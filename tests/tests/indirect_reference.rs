@@ -21,7 +21,8 @@ fn gathered(scene: &str, side: u32, samples: u32, count: u32, seed: u32) -> Imag
 fn even_blocks(reference: &Image, k: usize) -> Mask {
     let (width, height) = (reference.width / k, reference.height / k);
     let block = |x: usize, y: usize| {
-        let values: Vec<f32> = (0..k * k).map(|index| reference.pixels[(y * k + index / k) * reference.width + x * k + index % k][1]).collect();
+        let values: Vec<f32> =
+            (0..k * k).map(|index| reference.pixels[(y * k + index / k) * reference.width + x * k + index % k][1]).collect();
         let (low, high) = values.iter().fold((f32::MAX, 0.0f32), |(low, high), value| (low.min(*value), high.max(*value)));
         high < 1.5 * low
     };
@@ -41,7 +42,8 @@ fn error_falls_as_one_over_the_number_of_lights() {
     let mut errors = Vec::new();
     for count in [256, 1024, 4096] {
         // Sub-pixel positions and lights differ by seed; the mean over seeds tells the trend from luck.
-        let of_seed = |seed: u32| compare(&reference, &gathered("builtin:cornell-glossy", 30, 16, count, seed), &mask).unwrap().relative_mse;
+        let of_seed =
+            |seed: u32| compare(&reference, &gathered("builtin:cornell-glossy", 30, 16, count, seed), &mask).unwrap().relative_mse;
         let error = (of_seed(1) + of_seed(2)) / 2.0;
         println!("16 x {count} lights: relative MSE {error:.6} over {:.0} % of the blocks", 100.0 * mask.share());
         errors.push(error);
@@ -87,17 +89,21 @@ fn brute_force_mean(scene: &Scene, side: u32, paths: u32) -> DVec3 {
     for y in 0..side {
         for x in 0..side {
             for _ in 0..paths {
-                let ndc = [(f64::from(x) + random()) / f64::from(side) * 2.0 - 1.0, 1.0 - (f64::from(y) + random()) / f64::from(side) * 2.0];
+                let ndc =
+                    [(f64::from(x) + random()) / f64::from(side) * 2.0 - 1.0, 1.0 - (f64::from(y) + random()) / f64::from(side) * 2.0];
                 let view = (camera.forward + camera.right * (ndc[0] * tangent) + camera.up * (ndc[1] * tangent)).normalize();
                 let Some(first) = nearest(&triangles, camera.position - origin, view) else { continue };
                 let (radius, angle) = (random().sqrt(), random() * std::f64::consts::TAU);
                 let (t, b) = first.normal.any_orthonormal_pair();
-                let direction = t * (radius * angle.cos()) + b * (radius * angle.sin()) + first.normal * (1.0 - radius * radius).max(0.0).sqrt();
+                let direction =
+                    t * (radius * angle.cos()) + b * (radius * angle.sin()) + first.normal * (1.0 - radius * radius).max(0.0).sqrt();
                 let Some(second) = nearest(&triangles, first.position + first.normal * 1e-9, direction) else { continue };
                 let to_light = light_position - second.position;
                 let (distance, l) = (to_light.length(), to_light.normalize());
                 let cosine = second.normal.dot(l);
-                if cosine <= 0.0 || nearest(&triangles, second.position + second.normal * 1e-9, l).is_some_and(|hit| hit.distance < distance) {
+                if cosine <= 0.0
+                    || nearest(&triangles, second.position + second.normal * 1e-9, l).is_some_and(|hit| hit.distance < distance)
+                {
                     continue;
                 }
                 let ramp = (-l).dot(light.direction) - f64::from(outer).cos();

@@ -5,8 +5,8 @@ use lobelia::{
     Session, SessionOptions, Shot,
     frame::{ImageShape, Radiance, SceneWorld},
     graph::{
-        BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, GraphFile, InputShapes, OutputShapes, Params, Pass, PlanContext, PortError, Ports,
-        RunError,
+        BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, GraphFile, InputShapes, OutputShapes, Params, Pass, PlanContext,
+        PortError, Ports, RunError,
     },
     shaders::Source,
 };
@@ -71,7 +71,8 @@ impl Pass for Fog {
     fn create(context: &CreateContext<'_, Self>) -> Result<Self, BuildError> {
         let pipeline = context.gpu.compute_pipeline(context.name, Source { path: "fog.wgsl", text: WGSL }, "fog", context.flags)?;
         let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
-        let settings = context.gpu.device().create_buffer(&wgpu::BufferDescriptor { label: None, size: 16, usage, mapped_at_creation: false });
+        let settings =
+            context.gpu.device().create_buffer(&wgpu::BufferDescriptor { label: None, size: 16, usage, mapped_at_creation: false });
         context.gpu.queue().write_buffer(&settings, 0, &context.params.transmittance.to_le_bytes());
         Ok(Self { pipeline, settings })
     }

@@ -5,8 +5,8 @@ use lobelia::{
     Session, SessionOptions, Shot,
     frame::{GBuffer, ImageShape, Radiance, SceneWorld},
     graph::{
-        BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, GraphFile, History, InputShapes, OutputShapes, ParamValue, Params, Pass,
-        PlanContext, PlanOptions, PortError, Ports, Registry, RunError, RunOptions, Runner,
+        BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, GraphFile, History, InputShapes, OutputShapes, ParamValue, Params,
+        Pass, PlanContext, PlanOptions, PortError, Ports, Registry, RunError, RunOptions, Runner,
     },
     scene::device::ViewUniform,
     shaders::{Flags, Source},
@@ -214,7 +214,9 @@ fn the_first_pass_that_writes_a_bad_value_is_named() {
         return;
     }
     run_planted("nothing", true).unwrap();
-    for (fault, counts) in [("nan", "1 non-finite and 0 negative"), ("infinity", "1 non-finite and 0 negative"), ("negative", "0 non-finite and 1 negative")] {
+    for (fault, counts) in
+        [("nan", "1 non-finite and 0 negative"), ("infinity", "1 non-finite and 0 negative"), ("negative", "0 non-finite and 1 negative")]
+    {
         let error = run_planted(fault, true).unwrap_err();
         assert!(error.contains("pass `odd` (plant)") && error.contains(counts) && error.contains("odd.radiance/image"), "{fault}: {error}");
         // Without the net nobody notices, which is why it is there.
@@ -314,7 +316,11 @@ fn the_specialised_picture_is_the_general_one() {
         };
         let ((special, less), (general, more)) = (picture(true), picture(false));
         assert!(less < more, "{scene}: {less} {more}");
-        let off = special.pixels.iter().zip(&general.pixels).map(|(a, b)| (0..3).map(|c| (a[c] - b[c]).abs() / (a[c].abs() + 1e-3)).fold(0.0, f32::max));
+        let off = special
+            .pixels
+            .iter()
+            .zip(&general.pixels)
+            .map(|(a, b)| (0..3).map(|c| (a[c] - b[c]).abs() / (a[c].abs() + 1e-3)).fold(0.0, f32::max));
         let worst = off.fold(0.0, f32::max);
         assert!(worst < 4e-3, "{scene}: a pixel differs by {worst}");
     }
@@ -332,14 +338,17 @@ fn extremes_leave_no_bad_value() {
         let set = ["rsm.resolution=64", "lights.count=256", "indirect.clamp=none"].map(|text| text.parse().unwrap());
         let wired = graph.wire(&lobelia::registry(), &[], &set).unwrap();
         for seed in [0, 1, u32::MAX] {
-            let shot = Shot { extent: [33, 17], seed, samples: 2, run: RunOptions { check: true, ..RunOptions::default() }, ..Shot::default() };
+            let shot =
+                Shot { extent: [33, 17], seed, samples: 2, run: RunOptions { check: true, ..RunOptions::default() }, ..Shot::default() };
             session.start(&wired, &shot).unwrap().run(&mut |_| true).unwrap();
         }
         // A camera that touches a surface, and one that looks along it.
         let wired = graph.wire(&lobelia::registry(), &[], &set).unwrap();
         let plan = wired.plan(&session.scene().traits(), &PlanOptions::new([16, 16])).unwrap();
         let mut runner = Runner::new(session.gpu(), plan, session.device(), RunOptions { check: true, ..RunOptions::default() }).unwrap();
-        for (from, to) in [([0.0, 1e-4, 0.0], [0.0, 1e-4, -1.0]), ([0.9, 0.0, 0.0], [-0.9, 0.0, 0.0]), ([0.0, 900.0, 0.0], [0.0, 0.0, -1e-3])] {
+        for (from, to) in
+            [([0.0, 1e-4, 0.0], [0.0, 1e-4, -1.0]), ([0.9, 0.0, 0.0], [-0.9, 0.0, 0.0]), ([0.0, 900.0, 0.0], [0.0, 0.0, -1e-3])]
+        {
             let (from, to) = (glam::DVec3::from_array(from), glam::DVec3::from_array(to));
             let camera = lobelia::scene::Camera::look_at("odd", from, to, glam::DVec3::Y, 1.0, 1e-5).unwrap();
             let view = ViewUniform::new(&camera, session.scene().origin(), [16, 16], glam::Vec2::ZERO, 0, 0, None);
@@ -348,4 +357,3 @@ fn extremes_leave_no_bad_value() {
         }
     }
 }
-

@@ -47,14 +47,18 @@ fn brdf_twins() {
             // Half of the view directions are near the mirror of the light, where sharp lobes are.
             let l = direction(a, b);
             let mirror = DVec3::new(-l.x, -l.y, l.z);
-            let v = if index % 2 == 0 { direction(c, d) } else { (mirror + (direction(c, d) - DVec3::Z) * 10f64.powf(-4.0 * c)).normalize() };
+            let v =
+                if index % 2 == 0 { direction(c, d) } else { (mirror + (direction(c, d) - DVec3::Z) * 10f64.powf(-4.0 * c)).normalize() };
             let roughness = if index % 3 == 0 { 0.0 } else { roughness };
             let brdf = Brdf::new(DVec3::new(0.9, 0.5, 0.1), metallic, roughness, 1.0, distribution);
             let ((l32, l), (v32, v), (n32, n)) = (rounded(l), rounded(v), rounded(DVec3::Z));
             let (alpha, diffuse, normal) = (brdf.alpha as f32, rounded(brdf.diffuse), rounded(brdf.reflectance_normal));
             let seen = Brdf { alpha: f64::from(alpha), diffuse: diffuse.1, reflectance_normal: normal.1, ..brdf };
             // A half vector in 32 bits is off by 2^-23; at this alpha that moves the lobe by less than the tolerance below.
-            rows.push([l32.extend(0.0), v32.extend(0.0), n32.extend(0.0), normal.0.extend(1.0), diffuse.0.extend(alpha)].map(|row| row.to_array()));
+            rows.push(
+                [l32.extend(0.0), v32.extend(0.0), n32.extend(0.0), normal.0.extend(1.0), diffuse.0.extend(alpha)]
+                    .map(|row| row.to_array()),
+            );
             twins.push(seen.evaluate(n, l, v));
         }
         let flags = Flags::new().with("SPECULAR", true).with("NDF_PHONG", phong);
