@@ -205,7 +205,7 @@ fn evaluate(input: Input) -> Output {
     let (mut rows, mut expected) = (Vec::new(), Vec::new());
     for index in 0..10_000u32 {
         let ([a, b], [c, _]) = (r2_point(index, 8), r2_point(index, 9));
-        let outer = (0.01 + 1.55 * a).min(1.5707);
+        let outer = (0.01 + 1.55 * a).min(std::f64::consts::FRAC_PI_2 - 1e-4);
         let inner = if index % 7 == 0 { outer } else { outer * b };
         let cosine = (2.0 * c - 1.0).clamp(-1.0, 1.0);
         rows.push([cosine as f32, outer.cos() as f32, (1.0 / (inner.cos() - outer.cos()).max(0.001)) as f32, 0.0]);
