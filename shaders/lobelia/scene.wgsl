@@ -77,3 +77,14 @@ fn view_depth(view: View, depth: f32) -> f32 {
 fn scene_position(view: View, pixel: vec2f, depth: f32) -> vec3f {
     return view.position + primary_ray(view, pixel) * view_depth(view, depth);
 }
+
+// The inverse of `scene_position`: pixel coordinates and depth of a point of the scene. The depth lies in (0, 1] for what the camera can see; for points
+// level with the camera or behind it it does not, and the pixel means nothing.
+fn project(view: View, position: vec3f) -> vec3f {
+    let offset = position - view.position;
+    let along = dot(offset, view.forward);
+    let distance = select(along, -1e-20, abs(along) < 1e-20);
+    let ndc = vec2f(dot(offset, view.right) / dot(view.right, view.right), dot(offset, view.up) / dot(view.up, view.up)) / distance;
+    let pixel = (vec2f(ndc.x, -ndc.y) + vec2f(1.0)) * 0.5 * view.extent - vec2f(0.5) - view.jitter;
+    return vec3f(pixel, view.near / distance);
+}

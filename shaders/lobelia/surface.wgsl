@@ -85,7 +85,8 @@ struct MaterialTexels {
 }
 
 // A surface from its material, its texels, and the interpolated (not unit) normal and tangent. `to_viewer` need not be unit; `front` is
-// whether the viewer sees the front face. Normals are turned to the viewer's side of the true surface `face_normal` (any length).
+// whether the viewer sees the front face, the one that emits. Surfaces are two-sided: both normals are turned so that the geometric one faces the
+// viewer. A zero normal becomes the direction to the viewer, a zero tangent takes the map's x and y away.
 fn material_surface(
     material: Material,
     texels: MaterialTexels,

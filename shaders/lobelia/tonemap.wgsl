@@ -1,4 +1,5 @@
-// From linear radiance to display colours in [0, 1], sRGB-encoded. Every curve is finite for radiance in [0, 1e30] and does not fall for rising grey.
+// From linear radiance to display colours in [0, 1], sRGB-encoded. Every curve is finite for radiance in [0, 1e30]. For rising
+// grey none falls, but for AgX just before white, by at most 4e-6 besides rounding.
 #define_import_path lobelia::tonemap
 
 // Highlights beyond this are white under every curve.

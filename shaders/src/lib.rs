@@ -6,9 +6,11 @@
 //! Modules hold no bindings and no entry points, and never import under a condition; functions take textures and values as arguments.
 
 mod composer;
+mod error;
 mod flags;
 
-pub use composer::{Composed, Composer, ShaderError};
+pub use composer::{Composed, Composer};
+pub use error::ShaderError;
 pub use flags::{FlagValue, Flags};
 
 /// A WGSL text and the path that errors show for it.
