@@ -26,7 +26,8 @@ pub struct VplGatherPass {
 #[serde(default, deny_unknown_fields)]
 pub struct VplGatherParams {
     /// Upper bound of the geometry term `cos cos / d^2` of each light, or `none`. A light nearer than `1/sqrt(clamp)` metres adds less than it
-    /// should: no bright spots, but dark corners. `none` is unbiased.
+    /// should: no bright spots, but dark corners. The term goes with one over length squared: 10 suits rooms of metres; a scene k times as large wants
+    /// `10 / k^2`. `none` is unbiased; a pixel upon a light stays finite all the same, since distances below 1e-5 of the scene's radius count as that.
     #[param(unit = "1/m^2", range = 0.0..)]
     pub clamp: OrNone<f32>,
     /// Side k of the blocks in which each pixel gathers one k^2-th of the lights, filtered afterwards. 1 gathers every light at every pixel.
