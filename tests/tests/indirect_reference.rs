@@ -24,12 +24,23 @@ fn even_blocks(reference: &Image, k: usize) -> Mask {
         let values: Vec<f32> =
             (0..k * k).map(|index| reference.pixels[(y * k + index / k) * reference.width + x * k + index % k][1]).collect();
         let (low, high) = values.iter().fold((f32::MAX, 0.0f32), |(low, high), value| (low.min(*value), high.max(*value)));
-        high < 1.5 * low
+        high < 1.15 * low
     };
     Mask { counts: (0..width * height).map(|index| block(index % width, index / width)).collect() }
 }
 
-/// On blocks of 8 x 8 pixels, so that a test takes seconds. Each sample has its own lights; the average of S samples of N lights has S N of them.
+/// Relative MSE without the worst twentieth of the blocks: near creases the `1/d^2` of single lights dominates, whose variance is infinite, so that the
+/// plain mean of so few lights says more about luck than about N.
+fn trimmed(reference: &Image, test: &Image, mask: &Mask) -> f64 {
+    let alone = |index: usize| Mask { counts: (0..reference.pixels.len()).map(|other| other == index).collect() };
+    let counted = (0..reference.pixels.len()).filter(|index| mask.counts[*index]);
+    let mut errors: Vec<f64> = counted.map(|index| compare(reference, test, &alone(index)).unwrap().relative_mse).collect();
+    errors.sort_by(f64::total_cmp);
+    let kept = &errors[..errors.len() * 19 / 20];
+    kept.iter().sum::<f64>() / kept.len() as f64
+}
+
+/// On blocks of 4 x 4 pixels, so that a test takes seconds. Each sample has its own lights; the average of S samples of N lights has S N of them.
 #[test]
 fn error_falls_as_one_over_the_number_of_lights() {
     if !has_gpu() {
@@ -37,20 +48,19 @@ fn error_falls_as_one_over_the_number_of_lights() {
     }
     let Some(shared) = shared() else { return };
     let full = read_exr(&shared.join("reference/cornell-glossy-main_indirect1.exr")).unwrap();
-    let (reference, mask) = (full.downsampled(8).unwrap(), even_blocks(&full, 8));
-    assert!(mask.share() > 0.4, "{}", mask.share());
+    let (reference, mask) = (full.downsampled(4).unwrap(), even_blocks(&full, 4));
+    assert!(mask.share() > 0.3, "{}", mask.share());
     let mut errors = Vec::new();
     for count in [256, 1024, 4096] {
         // Sub-pixel positions and lights differ by seed; the mean over seeds tells the trend from luck.
-        let of_seed =
-            |seed: u32| compare(&reference, &gathered("builtin:cornell-glossy", 30, 16, count, seed), &mask).unwrap().relative_mse;
+        let of_seed = |seed: u32| trimmed(&reference, &gathered("builtin:cornell-glossy", 60, 4, count, seed), &mask);
         let error = (of_seed(1) + of_seed(2)) / 2.0;
-        println!("16 x {count} lights: relative MSE {error:.6} over {:.0} % of the blocks", 100.0 * mask.share());
+        println!("4 x {count} lights: relative MSE {error:.6} over {:.0} % of the blocks", 100.0 * mask.share());
         errors.push(error);
     }
-    // A factor of 4 each if it were 1/N exactly.
-    assert!(errors[1] < errors[0] / 2.0 && errors[2] < errors[1] / 2.0, "{errors:?}");
-    assert!(errors[2] < 2e-3, "{errors:?}");
+    // A factor of 4 each if it were 1/N exactly; low-discrepancy points do better.
+    assert!(errors[1] < errors[0] / 3.0 && errors[2] < errors[1] / 3.0, "{errors:?}");
+    assert!(errors[2] < 1e-4, "{errors:?}");
 }
 
 /// The same mean radiance in another seed, and not with the visibility missing.
