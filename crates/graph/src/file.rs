@@ -173,6 +173,18 @@ impl<'a> Reader<'a> {
         named
     }
 
+    /// A name that `pass.port` and `pass.param=value` could not tell from what follows it is refused.
+    fn check_pass_name(&mut self, name: &Spanned) {
+        let what = if name.text.trim().is_empty() {
+            "a pass needs a name".to_owned()
+        } else if name.text.contains(['.', '=']) {
+            format!("a pass cannot be called `{}`: `.` and `=` end a name", name.text)
+        } else {
+            return;
+        };
+        self.problems.push(Problem::at(name.span.clone(), what));
+    }
+
     /// `kind(param: value, ..., from: {...})`.
     fn pass(&mut self, name: Spanned, value: &'a RawValue) -> Option<PassEntry> {
         let text = value.trim().get_ron();
@@ -228,7 +240,11 @@ pub(crate) fn syntax_problem(slice: &str, base: usize, error: &ron::error::Spann
     let at = |place: ron::error::Position| base + offset_of(slice, place.line, place.col);
     let (start, end) = (at(error.span.start), at(error.span.end));
     let end = end.max(start);
-    Problem::at(start..end, error.code.to_string())
+    let message = match error.code {
+        ron::Error::ExceededRecursionLimit => "brackets are nested too deeply".to_owned(),
+        ref code => code.to_string(),
+    };
+    Problem::at(start..end, message)
 }
 
 /// Byte offset of a line and column, both from 1, columns in characters.
@@ -241,8 +257,17 @@ impl GraphFile {
     /// Reads and takes apart a file.
     pub fn load(path: &Path) -> Result<Self, Problems> {
         let shown = path.display().to_string();
-        match std::fs::read_to_string(path) {
-            Ok(text) => Self::parse(&text, &shown),
+        match std::fs::read(path).map(String::from_utf8) {
+            Ok(Ok(text)) => Self::parse(&text, &shown),
+            Ok(Err(error)) => {
+                let start = error.utf8_error().valid_up_to();
+                let text = String::from_utf8_lossy(error.as_bytes()).into_owned();
+                Err(Problems {
+                    file: shown,
+                    text,
+                    problems: vec![Problem::at(start..start, "a graph is UTF-8 text, but this byte is not")],
+                })
+            }
             Err(error) => Err(Problems {
                 file: shown.clone(),
                 text: String::new(),
@@ -263,6 +288,7 @@ impl GraphFile {
                 "passes" => {
                     seen_passes = true;
                     for (pass, value) in reader.entries(value.trim().get_ron(), "pass") {
+                        reader.check_pass_name(&pass);
                         passes.extend(reader.pass(pass, value));
                     }
                 }

@@ -2,7 +2,7 @@
 //! and every input port finds its producer.
 
 use crate::{
-    file::{GraphFile, PassEntry, Replacement, Spanned, syntax_problem},
+    file::{GraphFile, PassEntry, Replacement, Spanned, ron_options, syntax_problem},
     pass::World,
     ports::{Arity, PortInfo},
     problem::{Problem, Problems},
@@ -240,7 +240,9 @@ fn resolve_params<W: World>(
             problems.push(Problem::on_command_line(what).help(unknown_help(&name)));
             continue;
         }
-        if let Err(error) = kind.parse(&format!("({name}:{})", item.value)) {
+        // The value must be one value: `64, seed: 5` would set two parameters.
+        let one = ron_options().from_str::<&ron::value::RawValue>(&item.value).map(|_| ());
+        if let Err(error) = one.and_then(|()| kind.parse(&format!("({name}:{})", item.value)).map(|_| ())) {
             let what = format!("--set {pass}.{name}: `{}` is not a value for it: {}", item.value, error.code);
             problems.push(Problem::on_command_line(what).maybe_help(param_help(kind, &name)));
             continue;
@@ -322,6 +324,7 @@ fn find_port<W: World>(passes: &[WiredPass<W>], text: &str) -> Result<PortRef, S
         let all = passes.iter().map(|pass| pass.name.as_str());
         return Err(match nearest(pass_name, all.clone()) {
             Some(near) => format!("did you mean `{near}`?"),
+            None if passes.is_empty() => "the graph has no passes".into(),
             None => format!("the passes are {}", all.collect::<Vec<_>>().join(", ")),
         });
     };

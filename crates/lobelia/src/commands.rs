@@ -48,7 +48,7 @@ pub struct SceneArguments {
     #[arg(long, value_name = "ggx|phong")]
     pub ndf: Option<Ndf>,
     /// Time of animations in seconds.
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_negative_numbers = true)]
     pub time: f32,
 }
 

@@ -1,7 +1,7 @@
 use crate::failure::Failure;
 use lobelia::{
     Session, SessionOptions,
-    graph::{GraphFile, PlanOptions},
+    graph::{GraphFile, PlanOptions, Problems},
 };
 use std::{io::Write, path::PathBuf};
 
@@ -29,10 +29,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let checked = GraphFile::load(path).and_then(|graph| {
             let names: Vec<String> = graph.variant_names().map(str::to_owned).collect();
             for variants in std::iter::once(Vec::new()).chain(names.iter().map(|name| vec![name.clone()])) {
-                let wired = graph.wire(&registry, &variants, &[])?;
-                if let Some(traits) = &traits {
-                    wired.plan(traits, &PlanOptions::new([960, 540]))?;
-                }
+                let planned = graph.wire(&registry, &variants, &[]).and_then(|wired| match &traits {
+                    Some(traits) => wired.plan(traits, &PlanOptions::new([960, 540])).map(|_| ()),
+                    None => Ok(()),
+                });
+                planned.map_err(|problems| in_variant(problems, variants.first()))?;
             }
             Ok(names.len())
         });
@@ -47,4 +48,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
     }
     failed.map_or(Ok(()), Err)
+}
+
+/// The place of a problem may be in a pass that is good without the variant, so the variant is named.
+fn in_variant(mut problems: Problems, variant: Option<&String>) -> Problems {
+    if let Some(variant) = variant {
+        for problem in &mut problems.problems {
+            problem.message = format!("variant `{variant}`: {}", problem.message);
+        }
+    }
+    problems
 }

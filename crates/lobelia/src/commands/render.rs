@@ -39,13 +39,13 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME")]
     camera: Option<String>,
     /// Average this many sub-pixel-jittered frames in linear radiance.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     samples: u32,
     /// Run this many frames and write the last; animated scenes move on by 1/24 s each.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     frames: u32,
     /// Seed of everything random; equal seeds give equal pictures.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     seed: u32,
     /// Write any resource of the graph: .exr (radiance), .png (display image or radiance), .npz (anything).
     #[arg(long = "save", value_name = "PASS.PORT=FILE", value_parser = parse_save)]
@@ -136,8 +136,12 @@ fn check_goals(arguments: &Arguments) -> Result<(), Failure> {
         files::kind_of(path, &[Kind::Png, Kind::Exr])?;
     }
     let saves = arguments.saves.iter().map(|(_, path)| path);
+    let mut goals = std::collections::BTreeSet::new();
     for path in arguments.output.iter().chain(saves).chain(&arguments.profile) {
         files::check_folder(path)?;
+        if !goals.insert(path) {
+            return Err(Failure::Input(format!("{}: two results cannot be written to one file", path.display())));
+        }
     }
     Ok(())
 }
