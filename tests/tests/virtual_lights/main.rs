@@ -2,6 +2,7 @@
 //! refuses.
 #![allow(clippy::unwrap_used, missing_docs)]
 
+mod animated;
 mod gather;
 mod given;
 mod pick;
