@@ -243,7 +243,8 @@ fn resolve_params<W: World>(
         // The value must be one value: `64, seed: 5` would set two parameters.
         let one = ron_options().from_str::<&ron::value::RawValue>(&item.value).map(|_| ());
         if let Err(error) = one.and_then(|()| kind.parse(&format!("({name}:{})", item.value)).map(|_| ())) {
-            let what = format!("--set {pass}.{name}: `{}` is not a value for it: {}", item.value, error.code);
+            let fault = unfit(kind, &name, &error.code).unwrap_or_else(|| error.code.to_string());
+            let what = format!("--set {pass}.{name}: `{}` is not a value for it: {fault}", item.value);
             problems.push(Problem::on_command_line(what).maybe_help(param_help(kind, &name)));
             continue;
         }
@@ -291,13 +292,21 @@ fn value_problem<W: World>(
     }
     let mut problem = syntax_problem(slice, value.span.start, &moved);
     if let Some(span) = &mut problem.span {
-        // Trailing text of the wrapper may be named; the value itself is what the reader should look at.
-        if span.start >= value.span.end {
+        // Trailing text of the wrapper, or the middle of a number, may be named; the value itself is what the reader should look at.
+        let scalar = !value.text.contains(['(', '[', '{', '"']);
+        if scalar || span.start >= value.span.end {
             *span = value.span.clone();
         }
     }
-    problem.message = format!("pass `{pass}`: `{}` cannot be {}: {}", name.text, value.text, problem.message);
+    let fault = unfit(kind, &name.text, &error.code).unwrap_or(problem.message);
+    problem.message = format!("pass `{pass}`: `{}` cannot be {}: {fault}", name.text, value.text);
     problem.maybe_help(param_help(kind, &name.text))
+}
+
+/// A number that its reader leaves half-read, such as 1.5 for an integer, is said to lack a comma; what it lacks is the type.
+fn unfit<W: World>(kind: &dyn Kind<W>, name: &str, error: &ron::Error) -> Option<String> {
+    let param = kind.info().params.iter().find(|param| param.name == name)?;
+    matches!(error, ron::Error::ExpectedComma).then(|| format!("Expected {}", param.kind))
 }
 
 fn param_help<W: World>(kind: &dyn Kind<W>, name: &str) -> Option<String> {
