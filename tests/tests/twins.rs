@@ -108,7 +108,7 @@ fn evaluate(input: Input) -> Output {
     }
     compare(&expected, &got, 1e-5, 1e-6).unwrap();
     println!("largest error of a packed direction: {worst:.2e} rad");
-    assert!(worst < 6.3e-5 && worst > 1e-6, "{worst}");
+    assert!(worst < 6.5e-5 && worst > 1e-6, "{worst}");
 }
 
 #[test]
