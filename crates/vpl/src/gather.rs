@@ -30,7 +30,8 @@ pub struct VplGatherParams {
     /// `10 / k^2`. `none` is unbiased; a pixel upon a light stays finite all the same, since distances below 1e-5 of the scene's radius count as that.
     #[param(unit = "1/m^2", range = 0.0..)]
     pub clamp: OrNone<f32>,
-    /// Side k of the blocks in which each pixel gathers one k^2-th of the lights, filtered afterwards. 1 gathers every light at every pixel.
+    /// Side k of the blocks in which each pixel gathers one k^2-th of the lights. A joint tent filter 2k - 1 pixels wide, which stops at edges of normal and
+    /// depth, then brings the lights of the block together; detail smaller than that is blurred. 1 gathers every light at every pixel.
     #[param(unit = "pixels", range = 1..=8)]
     pub interleave: u32,
 }
