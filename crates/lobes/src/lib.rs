@@ -2,10 +2,21 @@
 //!
 //! Every function that also exists in WGSL has the same name there; a device test (`tests/tests/twins.rs`) holds the two together over the whole domain.
 
+pub mod asg;
+pub mod asg_product;
+pub mod averaged_direction;
 pub mod brdf;
+pub mod cosine_lobe;
 pub mod light;
+pub mod lobe_similarity;
+pub mod microfacet_lobe;
 pub mod octahedral;
+pub mod quadrature;
 pub mod sampling;
+pub mod sg;
+pub mod sg_cosine;
+pub mod sg_light;
+pub mod special;
 pub mod tonemap;
 
 /// Relative luminance of linear Rec. 709 colour.

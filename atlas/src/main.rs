@@ -1,0 +1,2 @@
+//! Draws the atlas.
+fn main() {}
