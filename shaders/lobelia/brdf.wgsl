@@ -8,7 +8,7 @@
 // Flags: SPECULAR (off: Lambert only), NDF_PHONG (off: GGX), NORMAL_MAP (off: the geometric normal is the shading normal).
 #define_import_path lobelia::brdf
 
-#import lobelia::math::{INV_PI, PI, fifth_power, safe_normalize}
+#import lobelia::math::{INV_PI, PI, fifth_power, log_one_plus, safe_normalize}
 #import lobelia::surface::Surface
 
 const MIN_ALPHA: f32 = 0.001;
@@ -65,18 +65,10 @@ fn phong_exponent(alpha: f32) -> f32 {
     return max(2.0 / (alpha * alpha) - 2.0, 0.0);
 }
 
-// log(1 - x) for x in [0, 1), exact to rounding for small x too.
-fn log_one_minus(x: f32) -> f32 {
-    if x < 0.01 {
-        return -x * (1.0 + x * (0.5 + x * (0.333333333 + x * (0.25 + x * 0.2))));
-    }
-    return log(max(1.0 - x, 1e-30));
-}
-
 // (e + 2) / (2 pi) (n.h)^e (Walter et al. 2007, equation 30). The power is exp(e/2 log(1 - sin^2)): pow would lose the lobe at large exponents.
 fn phong_distribution(alpha: f32, n: vec3f, h: vec3f) -> f32 {
     let exponent = phong_exponent(alpha);
-    return (exponent + 2.0) * 0.5 * INV_PI * exp(0.5 * exponent * log_one_minus(sin_squared(n, h)));
+    return (exponent + 2.0) * 0.5 * INV_PI * exp(0.5 * exponent * log_one_plus(-sin_squared(n, h)));
 }
 
 // Smith's Lambda = 1/G1 - 1 of the Phong distribution, the rational fit for Beckmann's

@@ -36,6 +36,8 @@ pub fn modules() -> &'static [Source<'static>] {
     modules![
         "math",
         "octahedral",
+        "sg",
+        "sg_cosine",
         "packing",
         "scene",
         "light",

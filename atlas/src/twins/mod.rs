@@ -1,14 +1,29 @@
 //! Every WGSL lobe function with inputs and bounds, a module each.
 
+mod asg;
 mod averaged_direction;
-mod microfacet_lobe;
+mod cosine_lobe;
 mod lobe_similarity;
+mod microfacet_lobe;
 mod sampling;
+mod sg;
+mod sg_cosine;
 mod sg_light;
 
 use crate::twin::Twin;
 
 /// All twins.
 pub fn all() -> Vec<Twin> {
-    [averaged_direction::twins(), lobe_similarity::twins(), sg_light::twins(), microfacet_lobe::twins(), sampling::twins()].into_iter().flatten().collect()
+    let rooms = [
+        sg::twins,
+        sg_cosine::twins,
+        cosine_lobe::twins,
+        asg::twins,
+        averaged_direction::twins,
+        sg_light::twins,
+        lobe_similarity::twins,
+        microfacet_lobe::twins,
+        sampling::twins,
+    ];
+    rooms.into_iter().flat_map(|twins: fn() -> Vec<Twin>| twins()).collect()
 }

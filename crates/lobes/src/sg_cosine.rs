@@ -61,10 +61,10 @@ pub fn clamped_cosine_integral_at_horizon(sharpness: f64) -> f64 {
 pub fn hemisphere_integral(sharpness: f64, c: f64) -> f64 {
     let steepness = hemisphere_steepness(sharpness).max(1e-6);
     let whole = erf(steepness);
-    let share = if c >= 0.0 {
+    let share = if c >= 0.0 || steepness < 1.0 {
         0.5 + 0.5 * erf(steepness * c) / whole
     } else {
-        0.5 * (erfc(-steepness * c) - erfc(steepness)).max(0.0) / whole
+        0.5 * (erfc(-steepness * c) - erfc(steepness)) / whole
     };
     let e = (-sharpness).exp();
     2.0 * PI * decay_mean(sharpness) * (e + (1.0 - e) * share.clamp(0.0, 1.0))
