@@ -43,7 +43,7 @@ fn clamped_cosine_steepness(sharpness: f32) -> f32 {
 
 // Integral of G max(cos, 0), accurate: within 0.0013 A. Rounding adds 3e-6 of the value above the horizon, 1e-6 A below.
 fn clamped_cosine_integral(sharpness: f32, c: f32, s2: f32) -> f32 {
-    let t = max(clamped_cosine_steepness(sharpness), 1e-4);
+    let t = clamped_cosine_steepness(sharpness);
     let t2 = t * t;
     let tail = exp(-t2 * c * c) * t * s2 * decay_mean(t2 * s2) * 0.282094792;
     let share = clamp(0.5 * (c * erfc(-t * c) + erfc(t)) + tail, 0.0, 1.0);

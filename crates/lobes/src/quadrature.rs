@@ -213,7 +213,8 @@ mod tests {
         let normal = DVec3::new(0.3, -0.5, 0.8).normalize();
         for sharpness in [0.0, 1e-3, 1.0, 30.0, 1e4, 1e8] {
             let lobe = |axis| Exponent { gaussians: vec![(axis, sharpness)], squares: vec![] };
-            let check = |got: f64, want: f64| assert!((got - want).abs() <= 1e-12 * want + 1e-300, "sharpness {sharpness}: {got:e} {want:e}");
+            let check =
+                |got: f64, want: f64| assert!((got - want).abs() <= 1e-12 * want + 1e-300, "sharpness {sharpness}: {got:e} {want:e}");
             check(value(integrate_lobes(&lobe(normal), None, None)), 4.0 * PI * decay_mean(2.0 * sharpness));
             check(value(integrate_hemisphere(&lobe(normal), normal)), 2.0 * PI * decay_mean(sharpness));
             check(value(integrate_lobes(&lobe(normal), Some(normal), None)), 2.0 * PI * decay_mean_upper(sharpness));

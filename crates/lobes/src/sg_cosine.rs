@@ -111,7 +111,7 @@ pub fn clamped_cosine_integral(sharpness: f64, c: f64, s2: f64) -> f64 {
 }
 
 fn clamped_cosine_share(sharpness: f64, c: f64, s2: f64) -> f64 {
-    let t = clamped_cosine_steepness(sharpness).max(1e-4);
+    let t = clamped_cosine_steepness(sharpness);
     let t2 = t * t;
     let tail = (-t2 * c * c).exp() * t * s2 * decay_mean(t2 * s2) / (2.0 * PI.sqrt());
     (0.5 * (c * erfc(-t * c) + erfc(t)) + tail).clamp(0.0, 1.0)
