@@ -38,6 +38,8 @@ pub fn modules() -> &'static [Source<'static>] {
         "octahedral",
         "sg",
         "sg_cosine",
+        "asg",
+        "cosine_lobe",
         "packing",
         "scene",
         "light",
