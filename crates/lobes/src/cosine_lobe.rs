@@ -101,10 +101,10 @@ pub fn cosine_lobe_product_refined(a: &CosineLobe, b: &CosineLobe) -> CosineLobe
     let (n, m) = (a.exponent, b.exponent);
     // The peak is between the axes, above both horizons; the derivative of the logarithm falls steadily from one end to the other.
     let (mut low, mut high) = ((angle - FRAC_PI_2).max(0.0), angle.min(FRAC_PI_2));
-    if high <= low || n + m <= 0.0 {
+    if angle > PI - 1e-9 || n + m <= 0.0 {
         return CosineLobe { amplitude: 0.0, ..*a };
     }
-    let mut t = (angle * m / (n + m)).clamp(low, high);
+    let mut t = (angle * m / (n + m)).max(low).min(high);
     for _ in 0..60 {
         let (left, right) = (n * t.tan(), m * (angle - t).tan());
         if left > right {
