@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 const POINTS: usize = 20;
 
 /// Nodes and weights of the Gauss-Legendre rule on [-1, 1].
-fn rule() -> &'static [(f64, f64)] {
+pub(crate) fn rule() -> &'static [(f64, f64)] {
     static RULE: OnceLock<Vec<(f64, f64)>> = OnceLock::new();
     RULE.get_or_init(|| {
         let points = NonZeroUsize::new(POINTS).unwrap_or(NonZeroUsize::MIN);
