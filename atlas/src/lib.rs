@@ -3,6 +3,7 @@
 //! The tables of [`twins`] serve both the tests (every WGSL function against its `f64` form) and the pages in `docs/lobes/`, which
 //! `cargo xtask atlas` draws anew.
 
+pub mod cost;
 pub mod draw;
 pub mod heat_map;
 pub mod twin;
