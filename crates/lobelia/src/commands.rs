@@ -4,6 +4,7 @@ pub mod adapters;
 pub mod check;
 pub mod explain;
 pub mod passes;
+pub mod reference;
 pub mod render;
 pub mod scene_info;
 

@@ -21,6 +21,7 @@ pub use lobelia_gbuffer as gbuffer;
 pub use lobelia_graph as graph;
 pub use lobelia_lobes as lobes;
 pub use lobelia_measure as measure;
+pub use lobelia_reference as reference;
 pub use lobelia_rsm as rsm;
 pub use lobelia_scene as scene;
 pub use lobelia_shaders as shaders;

@@ -16,6 +16,7 @@ use std::process::ExitCode;
 Examples:
   lobelia render graphs/indirect.ron --scene builtin:cornell-glossy -o out.png
   lobelia render graphs/indirect.ron --scene room.glb --variant no-visibility --set lights.count=4096 -o out.exr
+  lobelia reference --scene builtin:cornell-glossy --paths one-bounce --error 0.02 -o truth.exr
   lobelia explain graphs/indirect.ron --scene builtin:cornell-diffuse
   lobelia passes vpl-gather
 
@@ -29,6 +30,8 @@ struct Arguments {
 enum Command {
     /// Render a scene through a graph.
     Render(Box<commands::render::Arguments>),
+    /// Path-trace the truth on the CPU.
+    Reference(commands::reference::Arguments),
     /// List passes, or describe one: ports, parameters, units, ranges, defaults.
     Passes(commands::passes::Arguments),
     /// Show what a scene requires of a graph: order, kept, dropped and why, specialisations, memory.
@@ -52,6 +55,7 @@ fn main() -> ExitCode {
     // A reader that goes away (`lobelia passes | head`) is no reason to panic.
     let outcome = match Arguments::parse().command {
         Command::Render(arguments) => commands::render::run(&arguments),
+        Command::Reference(arguments) => commands::reference::run(&arguments),
         Command::Passes(arguments) => commands::passes::run(&arguments),
         Command::Explain(arguments) => commands::explain::run(&arguments),
         Command::Check(arguments) => commands::check::run(&arguments),

@@ -14,6 +14,11 @@ fn rows(m: [[f64; 3]; 3], color: DVec3) -> DVec3 {
     DVec3::from_array(m.map(|row| DVec3::from_array(row).dot(color)))
 }
 
+/// Inverse of [`srgb_encode`]: linear value of an encoded one in [0, 1].
+pub fn srgb_decode(encoded: f64) -> f64 {
+    if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}
+
 /// ACES reference and output transforms, rational fit by Stephen Hill (BakingLab, ACES.hlsl); linear in, linear out. Grey below 0.0033 is black.
 pub fn aces(radiance: DVec3) -> DVec3 {
     let color = radiance.clamp(DVec3::ZERO, DVec3::splat(MAX_INPUT));

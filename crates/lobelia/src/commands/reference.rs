@@ -1,0 +1,203 @@
+use super::{SceneArguments, parse_size};
+use crate::{
+    failure::Failure,
+    files::{self, Kind},
+};
+use indicatif::{ProgressBar, ProgressStyle};
+use lobelia::{
+    Session,
+    measure::Image,
+    reference::{Checkpoint, LightPaths, Picture, ReferenceError, Render, Settings},
+};
+use std::{
+    io::Write,
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+/// Path-trace the truth on the CPU.
+///
+/// The picture grows pass by pass until the wanted samples or error are reached. While it grows it is kept in a checkpoint beside the output; a run that
+/// was killed goes on from there, and the picture is the same bit for bit as that of an unbroken run. Beside R.exr, R.variance.exr holds the variance of
+/// each pixel's value.
+#[derive(clap::Args, Clone, Debug)]
+#[command(after_help = "\
+Examples:
+  lobelia reference --scene builtin:cornell-glossy --paths one-bounce --spp 256 -o truth.exr
+  lobelia reference --scene room.glb --camera sofa --size 1280x720 --paths full --error 0.02 -o room.exr
+  lobelia reference --scene room.glb --paths direct --spp 64 --threads 4 --seed 7 -o direct.exr")]
+pub struct Arguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// Which light: scattered once (direct), exactly twice (one-bounce), or all of it (full).
+    #[arg(long, value_enum, default_value_t = Paths::Full)]
+    paths: Paths,
+    /// Most scattering events of a path, for --paths full.
+    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    depth: u32,
+    /// Samples per pixel; rounded up to a multiple of 16 above 16. With --error, the most that are taken.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=u64::from(u32::MAX)))]
+    spp: Option<u64>,
+    /// Stop once the relative error is estimated to be below this: root of the mean of variance / (value^2 + (0.1 mean)^2).
+    #[arg(long, value_name = "E", value_parser = parse_error)]
+    error: Option<f64>,
+    /// Camera of the scene; its first if none is named.
+    #[arg(long, value_name = "NAME")]
+    camera: Option<String>,
+    /// Size of the picture in pixels.
+    #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "960x540")]
+    size: [u32; 2],
+    /// Chooses the noise; equal seeds give equal pictures on any number of threads.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u32,
+    /// Threads; all cores if not given.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Picture to write: .exr, linear RGB.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Print nothing but errors.
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// Names of [`LightPaths`].
+#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Paths {
+    /// Light that scatters exactly once; lights seen directly are not in it.
+    Direct,
+    /// Light that scatters exactly twice: one-bounce indirect light.
+    OneBounce,
+    /// Everything up to --depth scattering events, lights and background included.
+    Full,
+}
+
+impl Paths {
+    /// With a depth for `full`.
+    pub fn with_depth(self, depth: u32) -> LightPaths {
+        match self {
+            Self::Direct => LightPaths::Direct,
+            Self::OneBounce => LightPaths::OneBounce,
+            Self::Full => LightPaths::Full { depth },
+        }
+    }
+}
+
+fn parse_error(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(error) if error.is_finite() && error > 0.0 => Ok(error),
+        _ => Err("it must be a number above 0, such as 0.02 for 2 %".into()),
+    }
+}
+
+impl From<ReferenceError> for Failure {
+    fn from(error: ReferenceError) -> Self {
+        match error {
+            ReferenceError::Settings(_) => Failure::Input(error.to_string()),
+            error => Failure::Run(error.to_string()),
+        }
+    }
+}
+
+/// How often the checkpoint is written.
+const CHECKPOINT: Duration = Duration::from_secs(10);
+
+/// Samples where neither --spp nor --error is given, and the most with --error alone.
+const DEFAULT_SAMPLES: u64 = 256;
+const MOST_SAMPLES: u64 = 1 << 20;
+
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    files::kind_of(&arguments.output, &[Kind::Exr])?;
+    files::check_folder(&arguments.output)?;
+    let scene = Session::load(&arguments.scene.scene, &arguments.scene.options())?;
+    if !arguments.quiet {
+        for warning in &scene.warnings {
+            eprintln!("warning: {warning}");
+        }
+    }
+    let camera = scene.camera(arguments.camera.as_deref()).map_err(lobelia::SessionError::from)?;
+    let samples = arguments.spp.unwrap_or(if arguments.error.is_some() { MOST_SAMPLES } else { DEFAULT_SAMPLES });
+    let settings = Settings { size: arguments.size, paths: arguments.paths.with_depth(arguments.depth), samples, seed: arguments.seed };
+    let mut render = Render::new(&scene, &camera, settings)?;
+    let checkpoint = arguments.output.with_extension("checkpoint");
+    resume(&mut render, &checkpoint, arguments.quiet)?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.unwrap_or(0).into()).build();
+    let pool = pool.map_err(|error| Failure::Run(format!("cannot start threads: {error}")))?;
+    let picture = grow(arguments, &mut render, &pool, &checkpoint)?;
+    files::write_exr(&arguments.output, &image(&picture, &picture.pixels))?;
+    files::write_exr(&arguments.output.with_extension("variance.exr"), &image(&picture, &picture.variance))?;
+    if checkpoint.exists() {
+        std::fs::remove_file(&checkpoint).map_err(|error| Failure::Run(format!("{}: {error}", checkpoint.display())))?;
+    }
+    if !arguments.quiet {
+        let error = picture.relative_noise().sqrt();
+        writeln!(
+            std::io::stdout(),
+            "wrote {} ({} samples per pixel, estimated relative error {:.2} %, {})",
+            arguments.output.display(),
+            picture.samples,
+            100.0 * error,
+            settings.paths
+        )?;
+        if picture.dropped > 0 {
+            eprintln!("warning: {} samples were not finite and count as black", picture.dropped);
+        }
+    }
+    Ok(())
+}
+
+/// Goes on from a checkpoint of the same picture; one of another picture is refused, so that it is not overwritten unseen.
+fn resume(render: &mut Render, checkpoint: &Path, quiet: bool) -> Result<(), Failure> {
+    if !checkpoint.exists() {
+        return Ok(());
+    }
+    let outcome = Checkpoint::load(checkpoint).and_then(|state| render.resume(state, checkpoint));
+    outcome.map_err(|error| Failure::Input(format!("{error}; remove the file to begin anew")))?;
+    if !quiet {
+        eprintln!("going on from {} after {} passes", checkpoint.display(), render.done());
+    }
+    Ok(())
+}
+
+fn grow(arguments: &Arguments, render: &mut Render, pool: &rayon::ThreadPool, checkpoint: &Path) -> Result<Picture, Failure> {
+    let bar = if arguments.quiet { ProgressBar::hidden() } else { ProgressBar::new(render.passes()) };
+    if let Ok(style) = ProgressStyle::with_template("{bar:32} {percent:>3} %  {elapsed_precise} (left {eta})  {msg}") {
+        bar.set_style(style);
+    }
+    bar.set_position(render.done());
+    let mut saved = Instant::now();
+    // The spread of passes says nothing before there are a few of them.
+    const LEAST: u64 = 4;
+    while render.done() < render.passes() {
+        pool.install(|| render.step());
+        let done = render.done();
+        // At fixed passes, so that where a picture stops does not depend on who watches.
+        let check = done >= LEAST && (done.is_power_of_two() || done % 8 == 0);
+        if check || !bar.is_hidden() {
+            let picture = render.picture();
+            let error = picture.relative_noise().sqrt();
+            // To halve the error takes four times the passes: the bar counts towards what is left at that rate.
+            if let Some(goal) = arguments.error
+                && check
+            {
+                let needed = (done as f64 * (error / goal).powi(2)).ceil() as u64;
+                bar.set_length(needed.clamp(done, render.passes()));
+                if error <= goal {
+                    break;
+                }
+            }
+            bar.set_message(format!("{} samples, relative error {:.2} %", picture.samples, 100.0 * error));
+        }
+        bar.set_position(done);
+        if saved.elapsed() >= CHECKPOINT {
+            render.checkpoint().save(checkpoint)?;
+            saved = Instant::now();
+        }
+    }
+    bar.finish_and_clear();
+    Ok(render.picture())
+}
+
+fn image(picture: &Picture, pixels: &[[f32; 3]]) -> Image {
+    Image { width: picture.size[0] as usize, height: picture.size[1] as usize, pixels: pixels.to_vec() }
+}
