@@ -21,6 +21,8 @@ pub struct LightSample {
     pub weight: DVec3,
     /// Density over solid angle; `None` for lights that no ray can meet.
     pub pdf: Option<f64>,
+    /// The area light, which does not stand in its own way.
+    pub emitter: Option<usize>,
 }
 
 /// A flat or round shape that emits.
@@ -118,20 +120,26 @@ impl Lights {
         }
         let index = index - self.punctual.len();
         if let Some(emitter) = self.emitters.get(index) {
-            return emitter.sample(position, u);
+            return emitter.sample(position, u).map(|sample| LightSample { emitter: Some(index), ..sample });
         }
         if index == self.emitters.len() && !self.triangles.is_empty() {
             return self.sample_triangle(scene, geometry, surfaces, position, u);
         }
         let sky = self.sky.as_ref()?;
         let (direction, pdf) = sky.sample(u);
-        (pdf > 0.0).then(|| LightSample { direction, distance: f64::INFINITY, weight: sky.radiance(direction) / pdf, pdf: Some(pdf) })
+        (pdf > 0.0).then(|| LightSample {
+            direction,
+            distance: f64::INFINITY,
+            weight: sky.radiance(direction) / pdf,
+            pdf: Some(pdf),
+            emitter: None,
+        })
     }
 
     fn sample_punctual(&self, light: &lobelia_scene::PunctualLight, position: DVec3) -> Option<LightSample> {
         let intensity = light.intensity.as_dvec3();
         if light.kind == LightKind::Directional {
-            return Some(LightSample { direction: -light.direction, distance: f64::INFINITY, weight: intensity, pdf: None });
+            return Some(LightSample { direction: -light.direction, distance: f64::INFINITY, weight: intensity, pdf: None, emitter: None });
         }
         let offset = light.position - self.origin - position;
         let distance = offset.length();
@@ -143,7 +151,13 @@ impl Lights {
             LightKind::Spot { inner, outer } => spot_falloff(-direction.dot(light.direction), inner.into(), outer.into()),
             LightKind::Point | LightKind::Directional => 1.0,
         };
-        (falloff > 0.0).then(|| LightSample { direction, distance, weight: intensity * falloff / (distance * distance), pdf: None })
+        (falloff > 0.0).then(|| LightSample {
+            direction,
+            distance,
+            weight: intensity * falloff / (distance * distance),
+            pdf: None,
+            emitter: None,
+        })
     }
 
     fn sample_triangle(
@@ -174,7 +188,7 @@ impl Lights {
         }
         let pdf = self.triangle_pdf(geometry, triangle, cosine, distance)?;
         let radiance = surfaces.emission(scene, geometry, triangle, weights);
-        Some(LightSample { direction, distance, weight: radiance / pdf, pdf: Some(pdf) })
+        Some(LightSample { direction, distance, weight: radiance / pdf, pdf: Some(pdf), emitter: None })
     }
 
     /// Density over solid angle with which a point of an emissive triangle is sampled; `None` for triangles that are not.
@@ -189,9 +203,10 @@ impl Lights {
         Some(share * distance * distance / (area(geometry, triangle) * cosine))
     }
 
-    /// The nearest area light that a ray meets before its reach, from either side; light comes only from the emitting one.
-    pub fn nearest_emitter(&self, segment: &Segment) -> Option<EmitterHit> {
-        let hits = self.emitters.iter().enumerate().filter_map(|(index, emitter)| {
+    /// The nearest area light but one that a ray meets before its reach, from either side; light comes only from the emitting one.
+    pub fn nearest_emitter(&self, segment: &Segment, but: Option<usize>) -> Option<EmitterHit> {
+        let others = self.emitters.iter().enumerate().filter(|(index, _)| Some(*index) != but);
+        let hits = others.filter_map(|(index, emitter)| {
             let (distance, front) = emitter.intersect(segment)?;
             Some(EmitterHit { emitter: index, distance, radiance: if front { emitter.radiance } else { DVec3::ZERO } })
         });
@@ -256,7 +271,13 @@ impl Emitter {
             AreaShape::Sphere { .. } => (self.axes.inverse().transpose() * local).dot(direction) < 0.0,
             AreaShape::Quad { .. } | AreaShape::Disk { .. } => self.facing().dot(direction) < 0.0,
         };
-        (faces && pdf > 0.0 && pdf.is_finite()).then(|| LightSample { direction, distance, weight: self.radiance / pdf, pdf: Some(pdf) })
+        (faces && pdf > 0.0 && pdf.is_finite()).then(|| LightSample {
+            direction,
+            distance,
+            weight: self.radiance / pdf,
+            pdf: Some(pdf),
+            emitter: None,
+        })
     }
 
     fn ball_radius(&self) -> f64 {
@@ -277,7 +298,7 @@ impl Emitter {
         // At the rim rounding may miss the sphere; its rim is as far away as the tangent is long.
         let distance = self.intersect(&segment).map_or((squared - radius * radius).sqrt(), |hit| hit.0);
         let pdf = cone_pdf(axis, versine, axis);
-        Some(LightSample { direction, distance, weight: self.radiance / pdf, pdf: Some(pdf) })
+        Some(LightSample { direction, distance, weight: self.radiance / pdf, pdf: Some(pdf), emitter: None })
     }
 
     fn pdf(&self, position: DVec3, direction: DVec3, distance: f64) -> f64 {

@@ -82,7 +82,7 @@ impl World {
     }
 
     fn meet(&self, segment: &Segment) -> Meeting {
-        let emitter = self.lights.nearest_emitter(segment);
+        let emitter = self.lights.nearest_emitter(segment, None);
         let mut rest = Segment { reach: emitter.map_or(segment.reach, |hit| hit.distance), ..*segment };
         let mut passed = 0.0;
         for _ in 0..HOLES {
@@ -101,13 +101,13 @@ impl World {
         })
     }
 
-    /// Whether light arrives along a ray: not stopped by a surface or by another area light.
-    fn is_free(&self, segment: &Segment) -> bool {
-        if self.lights.nearest_emitter(segment).is_some() {
+    /// Whether light arrives along a ray: not stopped by a surface, nor by an area light other than the one that it comes from.
+    fn is_free(&self, segment: &Segment, emitter: Option<usize>) -> bool {
+        if self.lights.nearest_emitter(segment, emitter).is_some() {
             return false;
         }
         // Cut-outs are rare: only where the quick test is stopped are holes looked for.
-        self.geometry.is_free(segment) || (self.has_cut_outs() && matches!(self.meet(segment), Meeting::Nothing))
+        self.geometry.is_free(segment) || (self.has_cut_outs() && matches!(self.meet(segment), Meeting::Nothing | Meeting::Emitter { .. }))
     }
 
     fn has_cut_outs(&self) -> bool {
@@ -182,7 +182,7 @@ impl World {
             let origin = lift(surface.position, surface.true_normal, sample.direction);
             // Short of the light itself.
             let reach = sample.distance * (1.0 - 1e-5) - (origin - surface.position).length();
-            if !self.is_free(&Segment { origin, direction: sample.direction, reach }) {
+            if !self.is_free(&Segment { origin, direction: sample.direction, reach }, sample.emitter) {
                 continue;
             }
             let share = sample.pdf.map_or(1.0, |pdf| pdf / (pdf + brdf_pdf(&surface.brdf, surface.normal, to_viewer, sample.direction)));
