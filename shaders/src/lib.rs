@@ -45,6 +45,7 @@ pub fn modules() -> &'static [Source<'static>] {
         "light",
         "surface",
         "brdf",
+        "microfacet_lobe",
         "sampling",
         "tonemap",
         "ray",

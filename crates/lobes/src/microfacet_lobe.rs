@@ -3,7 +3,7 @@
 //!
 //! alpha is in [0.001, 1] throughout. n: shading normal, o: to the viewer, h: half vector; all unit vectors.
 
-mod glossy;
+pub mod glossy;
 
 pub use glossy::*;
 
@@ -39,8 +39,8 @@ pub fn beckmann_distribution(alpha: f64, n: DVec3, h: DVec3) -> f64 {
     (-tangent_squared / (alpha * alpha)).exp() / (PI * width * width)
 }
 
-/// `G2 / (4 (n.l) (n.v))` for Beckmann's distribution, height-correlated Smith with the rational fit for Lambda (Walter et al. 2007, equation 27; within 0.35 %),
-/// for cosines in (0, 1]. The Phong distribution of the same alpha borrows its masking from here, so this is [`phong_visibility`].
+/// `G2 / (4 (n.l) (n.v))` for Beckmann's distribution, height-correlated Smith with the rational fit for Lambda (Walter et al. 2007, equation 27;
+/// within 0.35 %), for cosines in (0, 1]. The Phong distribution of the same alpha borrows its masking from here, so this is [`phong_visibility`].
 pub fn beckmann_visibility(alpha: f64, n_dot_l: f64, n_dot_v: f64) -> f64 {
     phong_visibility(alpha, n_dot_l, n_dot_v)
 }
@@ -55,8 +55,8 @@ pub fn ndf_sharpness_beckmann(alpha: f64) -> f64 {
 
 /// Sharpness of the SG with the curvature of the GGX distribution at the normal for small alpha, `2 / alpha^2`.
 ///
-/// L1 error with the true peak: 0.41 of the integral at small alpha, 0.36 at 0.5, 0.57 at 1. No single SG does better than 0.36 at small alpha, for it has no
-/// tail; see [`ggx_lobes_two`].
+/// L1 error with the true peak: 0.41 of the integral at small alpha, 0.36 at 0.5, 0.57 at 1. No single SG does better than 0.36 at small alpha, for
+/// it has no tail; see [`ggx_lobes_two`].
 pub fn ndf_sharpness_ggx(alpha: f64) -> f64 {
     2.0 / (alpha * alpha)
 }
@@ -85,14 +85,14 @@ pub fn beckmann_lobe(alpha: f64) -> NdfLobe {
     NdfLobe { sharpness: ndf_sharpness_beckmann(alpha), amplitude: 1.0 / (PI * alpha * alpha) }
 }
 
-/// The Phong distribution `(exponent + 2) / (2 pi) (n.h)^exponent` as one SG with its peak. (`(exponent + 1) / (2 pi)`, which is also in print, integrates to 1
-/// against the plain solid angle and loses 8 % at exponent 10.)
+/// The Phong distribution `(exponent + 2) / (2 pi) (n.h)^exponent` as one SG with its peak. (`(exponent + 1) / (2 pi)`, which is also in print,
+/// integrates to 1 against the plain solid angle and loses 8 % at exponent 10.)
 pub fn phong_lobe(exponent: f64) -> NdfLobe {
     NdfLobe { sharpness: ndf_sharpness_phong(exponent), amplitude: (exponent + 2.0) / (2.0 * PI) }
 }
 
-/// GGX as one SG with its peak; for alpha above 0.5 with [`ndf_sharpness_ggx_broad`], else with [`ndf_sharpness_ggx`]. L1 error about 0.41 up to alpha 0.3, less
-/// above 0.5.
+/// GGX as one SG with its peak; for alpha above 0.5 with [`ndf_sharpness_ggx_broad`], else with [`ndf_sharpness_ggx`]. L1 error about 0.41 up to
+/// alpha 0.3, less above 0.5.
 pub fn ggx_lobe_one(alpha: f64) -> NdfLobe {
     let sharpness = if alpha > 0.5 { ndf_sharpness_ggx_broad(alpha) } else { ndf_sharpness_ggx(alpha) };
     NdfLobe { sharpness, amplitude: 1.0 / (PI * alpha * alpha) }
@@ -104,7 +104,8 @@ pub const GGX_LOBES_TWO: [(f64, f64); 2] = [(0.554678, 1.469881), (0.445322, 0.2
 /// As [`GGX_LOBES_TWO`], of three SGs.
 pub const GGX_LOBES_THREE: [(f64, f64); 3] = [(0.289911, 2.291398), (0.497579, 0.593012), (0.212510, 0.094761)];
 
-/// GGX as a sum of two SGs: L1 error 0.117 of the integral for small alpha. For alpha up to 0.5; above, [`ggx_lobe_one`] is better. A form of this project.
+/// GGX as a sum of two SGs: L1 error 0.117 of the integral for small alpha. For alpha up to 0.5; above, [`ggx_lobe_one`] is better. A form of this
+/// project.
 pub fn ggx_lobes_two(alpha: f64) -> [NdfLobe; 2] {
     GGX_LOBES_TWO.map(|share| part_of_ggx(alpha, share))
 }
@@ -141,8 +142,8 @@ pub fn reflection_lobe_sg_printed(ndf_sharpness: f64, normal: DVec3, view: DVec3
     SphericalGaussian { axis: reflection_axis(normal, view), sharpness, amplitude: 1.0 }
 }
 
-/// The reflection lobe of an SG NDF as an SG of amplitude 1, finite for every view: [`reflection_lobe_sg_printed`] with the regularised cosine. A form of this
-/// project.
+/// The reflection lobe of an SG NDF as an SG of amplitude 1, finite for every view: [`reflection_lobe_sg_printed`] with the regularised cosine. A
+/// form of this project.
 ///
 /// An SG is round and the true lobe is not: L1 error 0.22 of the integral at 45 degrees and about 1 at 80 degrees for any alpha (Beckmann). Use
 /// [`reflection_lobe_asg`] from there on.
@@ -151,17 +152,19 @@ pub fn reflection_lobe_sg(ndf_sharpness: f64, normal: DVec3, view: DVec3) -> Sph
     SphericalGaussian { axis: reflection_axis(normal, view), sharpness, amplitude: 1.0 }
 }
 
-/// The reflection lobe as an ASG of amplitude 1: `eta_x = ndf_sharpness / (8 (n.o)^2)` along n x axis, `eta_y = ndf_sharpness / 8` in the plane of incidence
-/// (Xu et al. 2013, Anisotropic Spherical Gaussians, section 5). Infinite for a view in the horizon. Kept for comparison; n.o must not be 0.
+/// The reflection lobe as an ASG of amplitude 1: `eta_x = ndf_sharpness / (8 (n.o)^2)` along n x axis, `eta_y = ndf_sharpness / 8` in the plane of
+/// incidence (Xu et al. 2013, Anisotropic Spherical Gaussians, section 5). Infinite for a view in the horizon. Kept for comparison; n.o must not be
+/// 0.
 pub fn reflection_lobe_asg_printed(ndf_sharpness: f64, normal: DVec3, view: DVec3) -> AnisotropicSphericalGaussian {
     let stretch = normal.dot(view).powi(2).recip();
     reflection_lobe_of_stretch(ndf_sharpness, stretch, normal, view)
 }
 
-/// The reflection lobe as an ASG of amplitude 1, finite for every view: [`reflection_lobe_asg_printed`] with the regularised cosine. A form of this project.
+/// The reflection lobe as an ASG of amplitude 1, finite for every view: [`reflection_lobe_asg_printed`] with the regularised cosine. A form of this
+/// project.
 ///
-/// L1 error of a Beckmann lobe of alpha 0.05: 0.02 of the integral at 45 degrees, 0.15 at 80, 0.38 at 88; of alpha 0.4: 0.20, 0.43, 0.55. `eta_x` is at most
-/// `ndf_sharpness^2 / 4`, which is 1e12 for alpha 0.001. Multiply by the NDF's amplitude for D(h).
+/// L1 error of a Beckmann lobe of alpha 0.05: 0.02 of the integral at 45 degrees, 0.15 at 80, 0.38 at 88; of alpha 0.4: 0.20, 0.43, 0.55. `eta_x` is
+/// at most `ndf_sharpness^2 / 4`, which is 1e12 for alpha 0.001. Multiply by the NDF's amplitude for D(h).
 pub fn reflection_lobe_asg(ndf_sharpness: f64, normal: DVec3, view: DVec3) -> AnisotropicSphericalGaussian {
     reflection_lobe_of_stretch(ndf_sharpness, regularized_stretch(ndf_sharpness, normal, view), normal, view)
 }
@@ -173,8 +176,8 @@ fn reflection_lobe_of_stretch(ndf_sharpness: f64, stretch: f64, normal: DVec3, v
     AnisotropicSphericalGaussian { tangent, bitangent, axis, eta_x: eta_y * stretch, eta_y, amplitude: 1.0 }
 }
 
-/// Unit vectors along n x axis and in the plane of incidence, orthogonal to the axis. Where the cross product is shorter than 1e-6 any pair: the bandwidths are equal
-/// there.
+/// Unit vectors along n x axis and in the plane of incidence, orthogonal to the axis. Where the cross product is shorter than 1e-6 any pair: the
+/// bandwidths are equal there.
 ///
 /// The cross product of nearly parallel vectors is rounded in every direction, so its part along the axis is taken out.
 fn reflection_frame(normal: DVec3, axis: DVec3) -> (DVec3, DVec3) {
