@@ -106,7 +106,7 @@ mod tests {
         let polar = PI * 5.5 / 16.0;
         let centre = TAU * 8.5 / 32.0;
         let exact = sky.radiance(DVec3::new(centre.sin() * polar.sin(), polar.cos(), -centre.cos() * polar.sin()));
-        assert!((exact - DVec3::splat(100.0)).length() < 1e-6 && bright.x > 40.0, "{exact} {bright}");
+        assert!((exact - DVec3::splat(100.0)).length() < 1e-6 && bright.x > 20.0, "{exact} {bright}");
         assert!((sky.radiance(DVec3::Z) - DVec3::splat(0.2)).length() < 1e-6);
     }
 
@@ -114,7 +114,7 @@ mod tests {
     fn samples_have_the_density_that_is_said_and_their_mean_is_the_irradiance_of_a_sphere() {
         let sky = sky();
         let (mut mean, mut whole) = (0.0, 0.0);
-        let count = 64;
+        let count = 256;
         for i in 0..count * count {
             let u = [(f64::from(i % count) + 0.5) / f64::from(count), (f64::from(i / count) + 0.5) / f64::from(count)];
             let (direction, pdf) = sky.sample(u);
