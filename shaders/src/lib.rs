@@ -47,6 +47,7 @@ pub fn modules() -> &'static [Source<'static>] {
         "brdf",
         "microfacet_lobe",
         "sampling",
+        "direction_sampling",
         "tonemap",
         "ray",
         "raster",

@@ -1,4 +1,8 @@
-//! Well-spread points in integer arithmetic, bit for bit those of the device.
+//! Well-spread points in integer arithmetic, bit for bit those of the device, and directions drawn with them.
+
+mod directions;
+
+pub use directions::*;
 
 /// PCG hash (Jarzynski and Olano 2020).
 pub fn hash(value: u32) -> u32 {
