@@ -179,7 +179,7 @@ fn masking_over_cosine(alpha: f64, n_dot_v: f64) -> f64 {
 }
 
 /// Density of the reflection of `v` about [`sample_ggx_visible_normal`]: that of the half vector over `4 v.h`. Not 0 for l below the horizon, where 1 % of
-/// the reflections go at alpha 0.09, 6 % at 0.25 and a half at 1, seen from the normal; fewer from the side.
+/// the reflections go at alpha 0.09, 6 % at 0.25 and a half at 1, seen from the normal; fewer at grazing views.
 pub fn ggx_reflection_pdf(alpha: f64, normal: DVec3, v: DVec3, l: DVec3) -> f64 {
     let h = (l + v).normalize_or(normal);
     if normal.dot(h) <= 0.0 { 0.0 } else { 0.25 * ggx_distribution(alpha, normal, h) * masking_over_cosine(alpha, normal.dot(v)) }
