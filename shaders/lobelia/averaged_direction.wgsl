@@ -1,5 +1,6 @@
-// Averages of directions and of positions. The length R of a lobe's mean direction gives its sharpness; q = 1 - R^2 is stored beside a unit axis, since
-// near R = 1 everything depends on it. The twins in `f64`, with sources and the errors of approximations: `crates/lobes/src/averaged_direction.rs`.
+// Averages of directions and of positions. The length R of a lobe's mean direction gives its sharpness; q = 1 - R^2 is stored beside a unit
+// axis, since near R = 1 everything depends on it. The twins in `f64`, with sources and the errors of approximations:
+// `crates/lobes/src/averaged_direction.rs`.
 #define_import_path lobelia::averaged_direction
 
 // Length of the mean direction of a diffuse lobe, exactly 2/3.
@@ -82,8 +83,8 @@ fn averaged_direction_length(one_minus_length_squared: f32) -> f32 {
     return sqrt(1.0 - clamp(one_minus_length_squared, 0.0, 1.0));
 }
 
-// Sharpness of the SG whose mean direction has the length R, given with q = 1 - R^2: Banerjee's form with a correction of this project, within 0.10 %.
-// q below 1e-8 counts as that. Rounding adds 2e-6.
+// Sharpness of the SG whose mean direction has the length R, given with q = 1 - R^2: Banerjee's form with a correction of this project,
+// within 0.10 %. q below 1e-8 counts as that. Rounding adds 2e-6.
 fn sharpness_from_averaged_direction(r: f32, one_minus_length_squared: f32) -> f32 {
     let q = max(one_minus_length_squared, LEAST_ONE_MINUS_LENGTH_SQUARED);
     let square = r * r;
@@ -120,8 +121,9 @@ fn mean_difference_squared(a: AveragedDirection, b: AveragedDirection) -> f32 {
     return dot(d, d);
 }
 
-// Mean of four averaged directions with weights >= 0, which need not sum to 1. Exact: q is a sum of positive terms, the weighted q and the scatter of the
-// means, sum over pairs of w_i w_j |m_i - m_j|^2. Merges of merges with summed weights are the merge of all. Relative error of q 2e-6. Without any weight q is 1.
+// Mean of four averaged directions with weights >= 0, which need not sum to 1. Exact: q is a sum of positive terms, the weighted q and the
+// scatter of the means, sum over pairs of w_i w_j |m_i - m_j|^2. Merges of merges with summed weights are the merge of all. Relative error
+// of q 2e-6. Without any weight q is 1.
 fn merge_averaged_directions(parts: array<AveragedDirection, 4>, weights: vec4f) -> AveragedDirection {
     let a = parts[0];
     let b = parts[1];
@@ -136,7 +138,9 @@ fn merge_averaged_directions(parts: array<AveragedDirection, 4>, weights: vec4f)
     let q = vec4f(a.one_minus_length_squared, b.one_minus_length_squared, c.one_minus_length_squared, d.one_minus_length_squared);
     let r = w * sqrt(1.0 - clamp(q, vec4f(0.0), vec4f(1.0)));
     let m = a.axis * r.x + b.axis * r.y + c.axis * r.z + d.axis * r.w;
-    let scatter = w.x * (w.y * mean_difference_squared(a, b) + w.z * mean_difference_squared(a, c) + w.w * mean_difference_squared(a, d)) + w.y * (w.z * mean_difference_squared(b, c) + w.w * mean_difference_squared(b, d)) + w.z * w.w * mean_difference_squared(c, d);
+    let of_a = w.y * mean_difference_squared(a, b) + w.z * mean_difference_squared(a, c) + w.w * mean_difference_squared(a, d);
+    let of_b = w.z * mean_difference_squared(b, c) + w.w * mean_difference_squared(b, d);
+    let scatter = w.x * of_a + w.y * of_b + w.z * w.w * mean_difference_squared(c, d);
     let m_squared = dot(m, m);
     let axis = select(a.axis, m * inverseSqrt(max(m_squared, 1e-30)), m_squared > 1e-30);
     return AveragedDirection(axis, min(dot(w, q) + scatter, 1.0));
@@ -147,8 +151,8 @@ fn distance_squared(a: vec3f, b: vec3f) -> f32 {
     return dot(d, d);
 }
 
-// Mean and variance of four sets of positions with weights >= 0, which need not sum to 1. Exact: the weighted variances and the scatter of the means, no
-// difference of squares. Relative error of the variance 2e-6 for positions as given. Without any weight the first part.
+// Mean and variance of four sets of positions with weights >= 0, which need not sum to 1. Exact: the weighted variances and the scatter of
+// the means, no difference of squares. Relative error of the variance 2e-6 for positions as given. Without any weight the first part.
 fn merge_position_variance(parts: array<PositionVariance, 4>, weights: vec4f) -> PositionVariance {
     let a = parts[0];
     let b = parts[1];
@@ -161,7 +165,9 @@ fn merge_position_variance(parts: array<PositionVariance, 4>, weights: vec4f) ->
     let scaled = weights / largest;
     let w = scaled / (scaled.x + scaled.y + scaled.z + scaled.w);
     let mean = a.mean + (b.mean - a.mean) * w.y + (c.mean - a.mean) * w.z + (d.mean - a.mean) * w.w;
-    let scatter = w.x * (w.y * distance_squared(a.mean, b.mean) + w.z * distance_squared(a.mean, c.mean) + w.w * distance_squared(a.mean, d.mean)) + w.y * (w.z * distance_squared(b.mean, c.mean) + w.w * distance_squared(b.mean, d.mean)) + w.z * w.w * distance_squared(c.mean, d.mean);
+    let of_a = w.y * distance_squared(a.mean, b.mean) + w.z * distance_squared(a.mean, c.mean) + w.w * distance_squared(a.mean, d.mean);
+    let of_b = w.z * distance_squared(b.mean, c.mean) + w.w * distance_squared(b.mean, d.mean);
+    let scatter = w.x * of_a + w.y * of_b + w.z * w.w * distance_squared(c.mean, d.mean);
     return PositionVariance(mean, dot(w, vec4f(a.variance, b.variance, c.variance, d.variance)) + scatter);
 }
 

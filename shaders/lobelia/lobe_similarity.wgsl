@@ -1,6 +1,6 @@
-// How alike two lobes are, as the weight of a filter: both smoothed by a kernel, normalised in L2, multiplied and integrated; 1 for equal lobes.
-// Sharpnesses in [0, 1e8]; a kernel of INFINITE_KERNEL does not smooth. The twins in `f64`, with sources and the errors of approximations:
-// `crates/lobes/src/lobe_similarity.rs`.
+// How alike two lobes are, as the weight of a filter: both smoothed by a kernel, normalised in L2, multiplied and integrated; 1 for equal
+// lobes. Sharpnesses in [0, 1e8]; a kernel of INFINITE_KERNEL does not smooth. The twins in `f64`, with sources and the errors of
+// approximations: `crates/lobes/src/lobe_similarity.rs`.
 #define_import_path lobelia::lobe_similarity
 
 #import lobelia::math::{INV_PI, PI, decay_mean, log_one_plus, safe_normalize}
@@ -36,7 +36,8 @@ fn gaussian_similarity(variance_i: f32, variance_j: f32, mean_distance_squared: 
     return exp(0.5 * dimension * log_width_overlap(ratio) - 0.5 * mean_distance_squared / (variance_i + variance_j));
 }
 
-// log(2 sqrt(r) / (1 + r)) for r in (0, 1]: log(1 - t^2) / 2 with t = (1 - r)/(1 + r), which has all digits near r = 1, where log(4r/(1+r)^2) has none.
+// log(2 sqrt(r) / (1 + r)) for r in (0, 1]: log(1 - t^2) / 2 with t = (1 - r)/(1 + r), which has all digits near r = 1, where
+// log(4r/(1+r)^2) has none.
 fn log_width_overlap(ratio: f32) -> f32 {
     let t = (1.0 - ratio) / (1.0 + ratio);
     if t < 0.6 {
@@ -62,8 +63,8 @@ fn log_lobe_similarity(axis_i: vec3f, smoothed_i: f32, axis_j: vec3f, smoothed_j
     return log_width_overlap(ratio) - 0.5 * smallest / (1.0 + ratio) * dot(d, d);
 }
 
-// Similarity of two SGs of (smoothed) sharpness a and b: 2 sqrt(a b) / (a + b) exp(-a b / (a + b) |axis_i - axis_j|^2 / 2); 1 where both are 0. Takes lobes below a
-// sharpness of 1 for planar Gaussians, which lobe_similarity_exact does not.
+// Similarity of two SGs of (smoothed) sharpness a and b: 2 sqrt(a b) / (a + b) exp(-a b / (a + b) |axis_i - axis_j|^2 / 2); 1 where both
+// are 0. Takes lobes below a sharpness of 1 for planar Gaussians, which lobe_similarity_exact does not.
 fn lobe_similarity(axis_i: vec3f, smoothed_i: f32, axis_j: vec3f, smoothed_j: f32) -> f32 {
     return lobe_similarity_weight(axis_i, smoothed_i, axis_j, smoothed_j, 1.0);
 }
@@ -90,8 +91,8 @@ fn lobe_similarity_weight_exact(axis_i: vec3f, smoothed_i: f32, axis_j: vec3f, s
     return min(exp(beta * (product.log_amplitude + log_of_ratio(decay_mean(2.0 * product.sharpness) / widths))), 1.0);
 }
 
-// Arc tangent of y/x for y >= 0 in [0, pi]; absolute error 3e-7, 0 for (0, 0). The language allows its own 4096 units in the last place. Coefficients: Abramowitz
-// and Stegun 1964, equation 4.4.49.
+// Arc tangent of y/x for y >= 0 in [0, pi]; absolute error 3e-7, 0 for (0, 0). The language allows its own 4096 units in the last place.
+// Coefficients: Abramowitz and Stegun 1964, equation 4.4.49.
 fn half_turn_angle(y: f32, x: f32) -> f32 {
     let t = min(y, abs(x)) / max(max(y, abs(x)), 1e-30);
     let z = t * t;
@@ -115,7 +116,8 @@ fn diffuse_similarity_fast(normal_i: vec3f, normal_j: vec3f, sharpness: f32) -> 
     return exp(-0.5 * sharpness * dot(d, d));
 }
 
-// Variance of the Gaussian of normals that the SG form makes of the weight of smoothed diffuse lobes: (2 sharpness + kernel) / (beta sharpness kernel).
+// Variance of the Gaussian of normals that the SG form makes of the weight of smoothed diffuse lobes: (2 sharpness + kernel) / (beta
+// sharpness kernel).
 fn diffuse_weight_variance(sharpness: f32, kernel_sharpness: f32, beta: f32) -> f32 {
     return (2.0 * sharpness / kernel_sharpness + 1.0) / (beta * sharpness);
 }
@@ -131,8 +133,8 @@ fn turned_tangent(lobe: AnisotropicSphericalGaussian, mean: vec3f) -> vec3f {
     return lobe.tangent - (lobe.axis + mean) * (dot(lobe.tangent, mean) / max(1.0 + dot(lobe.axis, mean), 1e-6));
 }
 
-// Similarity of two ASGs smoothed by a kernel, the cosines left out: planar Gaussians of covariance diag(1/(2 eta)) + 1/kernel_sharpness about the mean axis. A form of
-// this project, equal to lobe_similarity for isotropic lobes. Bandwidths below 1e-6 count as that.
+// Similarity of two ASGs smoothed by a kernel, the cosines left out: planar Gaussians of covariance diag(1/(2 eta)) + 1/kernel_sharpness
+// about the mean axis. A form of this project, equal to lobe_similarity for isotropic lobes. Bandwidths below 1e-6 count as that.
 fn asg_similarity(i: AnisotropicSphericalGaussian, j: AnisotropicSphericalGaussian, kernel_sharpness: f32) -> f32 {
     return asg_similarity_weight(i, j, kernel_sharpness, 1.0);
 }

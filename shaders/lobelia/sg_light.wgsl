@@ -1,6 +1,6 @@
-// Virtual SG lights: a disk-like source of radius r seen as a cone, whose visibility is the SG 2 G, and the integrals of lobes over it. Distances and radii
-// are >= 0, 0 among them; nothing divides by r^2. Kernels are integrals over directions divided by pi r^2 (1/m^2) and tend to the point light's.
-// The twins in `f64`, with sources and the errors of approximations: `crates/lobes/src/sg_light.rs`.
+// Virtual SG lights: a disk-like source of radius r seen as a cone, whose visibility is the SG 2 G, and the integrals of lobes over it.
+// Distances and radii are >= 0, 0 among them; nothing divides by r^2. Kernels are integrals over directions divided by pi r^2 (1/m^2) and
+// tend to the point light's. The twins in `f64`, with sources and the errors of approximations: `crates/lobes/src/sg_light.rs`.
 #define_import_path lobelia::sg_light
 
 #import lobelia::math::{PI, TAU, decay_mean, safe_normalize}
@@ -10,9 +10,10 @@
 
 // sqrt(distance^2 + radius^2).
 fn cone_slant(distance: f32, radius: f32) -> f32 {
-    let larger = max(max(distance, radius), 1e-30);
-    let smaller = min(distance, radius) / larger;
-    return larger * sqrt(1.0 + smaller * smaller);
+    // Scaled by the larger one: neither square leaves the range of floats.
+    let larger = max(distance, radius);
+    let ratio = min(distance, radius) / max(larger, 1e-30);
+    return larger * sqrt(1.0 + ratio * ratio);
 }
 
 // s = 2 h (h + d) with the slant h: the sharpness of the cone times r^2.
@@ -23,11 +24,12 @@ fn cone_scaled_sharpness(distance: f32, radius: f32) -> f32 {
 
 // Solid angle of the cone, sr: 2 pi r^2 / (h (h + d)), 0 to 2 pi; 0 for radius 0. Relative error 2e-6.
 fn cone_solid_angle(distance: f32, radius: f32) -> f32 {
-    let h = cone_slant(distance, radius);
+    let h = max(cone_slant(distance, radius), 1e-30);
     return TAU * (radius / h) * (radius / (h + distance));
 }
 
-// Sharpness of the SG that stands for the cone: 4 pi / solid angle, 2 (a hemisphere) to 4e30 (r below 1e-15 h counts as that). Relative error 2e-6.
+// Sharpness of the SG that stands for the cone: 4 pi / solid angle, 2 (a hemisphere) to 4e30 (r below 1e-15 h counts as that). Relative
+// error 2e-6.
 fn cone_sharpness(distance: f32, radius: f32) -> f32 {
     if !(max(distance, radius) > 0.0) {
         return 2.0;
@@ -37,7 +39,8 @@ fn cone_sharpness(distance: f32, radius: f32) -> f32 {
     return 2.0 * (h / r) * ((h + distance) / r);
 }
 
-// Solid angle over the area of the disk, 1/m^2: 2 / (h (h + d)), 1/d^2 for radius 0; 0 where distance and radius are both 0. Relative error 2e-6.
+// Solid angle over the area of the disk, 1/m^2: 2 / (h (h + d)), 1/d^2 for radius 0; 0 where distance and radius are both 0. Relative error
+// 2e-6.
 fn solid_angle_over_disk_area(distance: f32, radius: f32) -> f32 {
     if !(max(distance, radius) > 0.0) {
         return 0.0;
@@ -98,14 +101,15 @@ fn vsgl_kernel_of_product(eta: vec2f, product: ScaledLightProduct, radius: f32) 
     return 4.0 * max(axis.z, 0.0) / (sqrt(xy.x) * sqrt(xy.y)) * exp(exponent);
 }
 
-// Integral of a receiver's ASG, an SG lobe of the light and the light's cone over pi r^2 (1/m^2), fast: the product with the ASG as Xu et al. print it. Directions in
-// the ASG's frame, amplitudes 1; sharpness and bandwidths in [0, 1e8]. Relative error 5e-6 + 8e-7 x for a value of exp(-x) times its prefactor.
+// Integral of a receiver's ASG, an SG lobe of the light and the light's cone over pi r^2 (1/m^2), fast: the product with the ASG as Xu et
+// al. print it. Directions in the ASG's frame, amplitudes 1; sharpness and bandwidths in [0, 1e8]. Relative error 5e-6 + 8e-7 x for a value
+// of exp(-x) times its prefactor.
 fn vsgl_kernel_fast(eta: vec2f, lobe_axis: vec3f, lobe_sharpness: f32, light_direction: vec3f, distance: f32, radius: f32) -> f32 {
     return vsgl_kernel_of_product(eta, scaled_light_product(lobe_axis, lobe_sharpness, light_direction, distance, radius), radius);
 }
 
-// The same integral, accurate: the product with the ASG about its true peak. For r = 0 the virtual point light, for lobe_sharpness = 0 a diffuse light; 0 where
-// distance and radius are both 0. A form of this project.
+// The same integral, accurate: the product with the ASG about its true peak. For r = 0 the virtual point light, for lobe_sharpness = 0 a
+// diffuse light; 0 where distance and radius are both 0. A form of this project.
 fn vsgl_kernel(eta: vec2f, lobe_axis: vec3f, lobe_sharpness: f32, light_direction: vec3f, distance: f32, radius: f32) -> f32 {
     let product = scaled_light_product(lobe_axis, lobe_sharpness, light_direction, distance, radius);
     let square = radius * radius;
@@ -117,7 +121,8 @@ fn vsgl_kernel(eta: vec2f, lobe_axis: vec3f, lobe_sharpness: f32, light_directio
     return 2.0 / (PI * square) * exp(product.log_amplitude) * integral;
 }
 
-// The same for a diffuse receiver, whose cosine is pulled out: lobe and cone over pi r^2 (1/m^2). Exact for the SGs; relative error 5e-6 + 8e-7 x.
+// The same for a diffuse receiver, whose cosine is pulled out: lobe and cone over pi r^2 (1/m^2). Exact for the SGs; relative error 5e-6 +
+// 8e-7 x.
 fn vsgl_kernel_diffuse_receiver(lobe_axis: vec3f, lobe_sharpness: f32, light_direction: vec3f, distance: f32, radius: f32) -> f32 {
     let product = scaled_light_product(lobe_axis, lobe_sharpness, light_direction, distance, radius);
     if !(product.sum > 0.0) {
@@ -142,8 +147,8 @@ fn vsgl_kernel_point(eta: vec2f, lobe_axis: vec3f, lobe_sharpness: f32, light_di
     return max(w.z, 0.0) * exp(exponent) * solid_angle_over_disk_area(distance, radius);
 }
 
-// Factor that takes the doubled peak of cone_visibility back where a receiver's lobe is narrower than the cone and looks into it, at the price of energy: 1 to 1/2.
-// An option that is off by default. sharpness_ratio: the lobe's sharpness over the cone's.
+// Factor that takes the doubled peak of cone_visibility back where a receiver's lobe is narrower than the cone and looks into it, at the
+// price of energy: 1 to 1/2. An option that is off by default. sharpness_ratio: the lobe's sharpness over the cone's.
 fn cone_peak_correction(sharpness_ratio: f32) -> f32 {
     return (1.0 + sharpness_ratio) * decay_mean(2.0 * sharpness_ratio);
 }
@@ -153,7 +158,8 @@ fn combined_sharpness_bound(eta_x: f32, eta_y: f32, lobe_sharpness: f32) -> f32 
     return 2.0 * max(eta_x, eta_y) + lobe_sharpness;
 }
 
-// Whether the light may be taken for a point with the lobes' values in its direction (vsgl_kernel_point): product_sharpness < threshold cone_sharpness.
+// Whether the light may be taken for a point with the lobes' values in its direction (vsgl_kernel_point): product_sharpness < threshold
+// cone_sharpness.
 fn bias_reduction_applies(product_sharpness: f32, threshold: f32, distance: f32, radius: f32) -> bool {
     return product_sharpness * radius * radius < threshold * cone_scaled_sharpness(distance, radius);
 }
