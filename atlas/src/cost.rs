@@ -1,7 +1,7 @@
 //! What each form of a lobe formula costs on a device: millions of evaluations in one dispatch, all forms in turn in the same run.
 
 use lobelia_graph::{BuildError, Gpu, GpuError};
-use lobelia_lobes::{asg, asg_product, sg, sg_cosine};
+use lobelia_lobes::{asg, asg_product, averaged_direction, lobe_similarity, microfacet_lobe, sg, sg_cosine, sg_light};
 use lobelia_shaders::{Flags, Source};
 use std::{
     fmt::Write as _,
@@ -131,7 +131,126 @@ pub fn forms() -> Vec<Form> {
             asg_product::asg_sg_integral,
             |case| asg_sg_integral(case.sharpness[0], case.sharpness[1], case.axes[1], case.sharpness[2])
         ),
+        form!(
+            "sharpness of an averaged direction",
+            "averaged_direction",
+            sharpness_from_averaged_direction_toksvig,
+            "0.5 + 0.5 * at.cosine, 0.75 - at.cosine * (0.5 + 0.25 * at.cosine)",
+            averaged_direction::sharpness_from_averaged_direction_toksvig,
+            |case| sharpness_from_averaged_direction_toksvig(length(case), 1.0 - length(case).powi(2))
+        ),
+        form!(
+            "sharpness of an averaged direction",
+            "averaged_direction",
+            sharpness_from_averaged_direction_banerjee,
+            "0.5 + 0.5 * at.cosine, 0.75 - at.cosine * (0.5 + 0.25 * at.cosine)",
+            averaged_direction::sharpness_from_averaged_direction_banerjee,
+            |case| sharpness_from_averaged_direction_banerjee(length(case), 1.0 - length(case).powi(2))
+        ),
+        form!(
+            "sharpness of an averaged direction",
+            "averaged_direction",
+            sharpness_from_averaged_direction,
+            "0.5 + 0.5 * at.cosine, 0.75 - at.cosine * (0.5 + 0.25 * at.cosine)",
+            averaged_direction::sharpness_from_averaged_direction,
+            |case| sharpness_from_averaged_direction(length(case), 1.0 - length(case).powi(2))
+        ),
+        form!(
+            "similarity of lobes",
+            "lobe_similarity",
+            lobe_similarity,
+            "at.a, at.sharpness.x, at.b, at.sharpness.y",
+            lobe_similarity::lobe_similarity,
+            |case| lobe_similarity(case.axes[0], case.sharpness[0], case.axes[1], case.sharpness[1])
+        ),
+        form!(
+            "similarity of lobes",
+            "lobe_similarity",
+            lobe_similarity_exact,
+            "at.a, at.sharpness.x, at.b, at.sharpness.y",
+            lobe_similarity::lobe_similarity_exact,
+            |case| lobe_similarity_exact(case.axes[0], case.sharpness[0], case.axes[1], case.sharpness[1])
+        ),
+        form!(
+            "virtual SG light's kernel",
+            "sg_light",
+            vsgl_kernel_fast,
+            "at.sharpness.xy, at.a, at.sharpness.z, at.b, 1.0, abs(at.cosine)",
+            sg_light::vsgl_kernel_fast,
+            |case| vsgl_kernel_fast(
+                [case.sharpness[0], case.sharpness[1]],
+                case.axes[0],
+                case.sharpness[2],
+                case.axes[1],
+                1.0,
+                case.cosine.abs()
+            )
+        ),
+        form!(
+            "virtual SG light's kernel",
+            "sg_light",
+            vsgl_kernel,
+            "at.sharpness.xy, at.a, at.sharpness.z, at.b, 1.0, abs(at.cosine)",
+            sg_light::vsgl_kernel,
+            |case| vsgl_kernel(
+                [case.sharpness[0], case.sharpness[1]],
+                case.axes[0],
+                case.sharpness[2],
+                case.axes[1],
+                1.0,
+                case.cosine.abs()
+            )
+        ),
+        form!(
+            "glossy shading by an SG light",
+            "microfacet_lobe",
+            glossy_sg_light_fast,
+            "abs(at.cosine) + 0.01, vec3f(0.0, 0.0, 1.0), at.b, at.a, at.sharpness.x",
+            microfacet_lobe::glossy_sg_light_fast,
+            |case| glossy_sg_light_fast(alpha(case), glam::DVec3::Z, case.axes[1], case.axes[0], case.sharpness[0])
+        ),
+        form!(
+            "glossy shading by an SG light",
+            "microfacet_lobe",
+            glossy_sg_light_one,
+            "abs(at.cosine) + 0.01, vec3f(0.0, 0.0, 1.0), at.b, at.a, at.sharpness.x",
+            microfacet_lobe::glossy_sg_light_one,
+            |case| glossy_sg_light_one(alpha(case), glam::DVec3::Z, case.axes[1], case.axes[0], case.sharpness[0])
+        ),
+        form!(
+            "glossy shading by an SG light",
+            "microfacet_lobe",
+            glossy_sg_light_two,
+            "abs(at.cosine) + 0.01, vec3f(0.0, 0.0, 1.0), at.b, at.a, at.sharpness.x",
+            microfacet_lobe::glossy_sg_light_two,
+            |case| glossy_sg_light_two(alpha(case), glam::DVec3::Z, case.axes[1], case.axes[0], case.sharpness[0])
+        ),
+        form!(
+            "glossy shading by an SG light",
+            "microfacet_lobe",
+            glossy_sg_light_three,
+            "abs(at.cosine) + 0.01, vec3f(0.0, 0.0, 1.0), at.b, at.a, at.sharpness.x",
+            microfacet_lobe::glossy_sg_light_three,
+            |case| glossy_sg_light_three(alpha(case), glam::DVec3::Z, case.axes[1], case.axes[0], case.sharpness[0])
+        ),
+        form!(
+            "glossy shading by an SG light",
+            "microfacet_lobe",
+            filtered_ndf_shading,
+            "abs(at.cosine) + 0.01, vec3f(0.0, 0.0, 1.0), at.b, at.a, at.sharpness.x",
+            microfacet_lobe::filtered_ndf_shading,
+            |case| filtered_ndf_shading(alpha(case), glam::DVec3::Z, case.axes[1], case.axes[0], case.sharpness[0])
+        ),
     ]
+}
+
+/// Length of an averaged direction.
+fn length(case: &Case) -> f64 {
+    0.5 + 0.5 * case.cosine
+}
+
+fn alpha(case: &Case) -> f64 {
+    (case.cosine.abs() + 0.01).min(1.0)
 }
 
 /// A table of cases for timing in Rust, and the generator that the shader uses.

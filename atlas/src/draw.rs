@@ -33,7 +33,7 @@ impl Draw {
 
     /// True once in `n` draws.
     pub fn one_in(&mut self, n: u32) -> bool {
-        self.bits() % n == 0
+        self.bits().is_multiple_of(n)
     }
 
     /// Log-uniform between two positive numbers, both ends among the values.

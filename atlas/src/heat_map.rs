@@ -176,7 +176,8 @@ pub fn draw(panels: &[Panel], file: &Path) -> Result<(), DrawError> {
         image::codecs::png::CompressionType::Best,
         image::codecs::png::FilterType::Adaptive,
     );
-    image::ImageEncoder::write_image(encoder, &pixels, size[0], size[1], image::ExtendedColorType::Rgb8).map_err(|error| fail(error.to_string()))?;
+    image::ImageEncoder::write_image(encoder, &pixels, size[0], size[1], image::ExtendedColorType::Rgb8)
+        .map_err(|error| fail(error.to_string()))?;
     let part = file.with_extension("png.part");
     std::fs::write(&part, &bytes).and_then(|()| std::fs::rename(&part, file)).map_err(|error| fail(error.to_string()))
 }
@@ -189,7 +190,13 @@ fn render(panels: &[Panel]) -> Result<(Vec<u8>, [u32; 2]), DrawError> {
         if let Panel::Map(map) = panel
             && (map.values.is_empty() || map.values.len() != map.size[0] * map.size[1])
         {
-            return Err(DrawError::Shape(format!("`{}` has {} values for {} x {} cells", map.title, map.values.len(), map.size[0], map.size[1])));
+            return Err(DrawError::Shape(format!(
+                "`{}` has {} values for {} x {} cells",
+                map.title,
+                map.values.len(),
+                map.size[0],
+                map.size[1]
+            )));
         }
     }
     font()?;
@@ -300,6 +307,7 @@ fn draw_curves(area: &Area<'_>, curves: &Curves) -> Result<(), DrawError> {
     }
     chart
         .configure_series_labels()
+        .position(SeriesLabelPosition::UpperRight)
         .background_style(WHITE.mix(0.85))
         .border_style(BLACK.mix(0.2))
         .label_font(("sans-serif", 12))
@@ -315,7 +323,13 @@ fn draw_bar(area: &Area<'_>, height: u32) -> Result<(), DrawError> {
         area.draw(&Rectangle::new([(8, y), (26, y + 1)], rgb(10f64.powf(exponent)).filled())).map_err(failed)?;
     }
     for decade in (LOW as i32)..=0 {
-        let label = if decade == 0 { "1 or more".to_owned() } else if f64::from(decade) == LOW { format!("1e{decade}, less") } else { format!("1e{decade}") };
+        let label = if decade == 0 {
+            "1 or more".to_owned()
+        } else if f64::from(decade) == LOW {
+            format!("1e{decade}, less")
+        } else {
+            format!("1e{decade}")
+        };
         area.draw(&Text::new(label, (31, place(f64::from(decade)) - 6), ("sans-serif", 12))).map_err(failed)?;
     }
     Ok(())
@@ -342,7 +356,9 @@ mod tests {
             assert!(seen(colour(error)) > 12_000, "{error}: {}", seen(colour(error)));
         }
         // Rows go up: the first two values are below the last two.
-        let place = |error: f64| picture.enumerate_pixels().filter(|(.., pixel)| pixel.0 == colour(error)).map(|(x, y, _)| (x, y)).nth(6000).unwrap();
+        let place = |error: f64| {
+            picture.enumerate_pixels().filter(|(.., pixel)| pixel.0 == colour(error)).map(|(x, y, _)| (x, y)).nth(6000).unwrap()
+        };
         assert!(place(1e-3).1 > place(f64::NAN).1 && place(1e-3).0 > 190);
         assert_ne!(colour(f64::NAN), colour(1.0));
         assert_eq!((colour(0.0), colour(5.0)), (colour(1e-7), colour(1.0)));

@@ -5,6 +5,8 @@
 
 pub mod cost;
 pub mod draw;
+pub mod figures;
 pub mod heat_map;
+pub mod table;
 pub mod twin;
 pub mod twins;

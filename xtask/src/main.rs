@@ -1,4 +1,4 @@
-//! Chores of the workspace: `cargo xtask render`, `cargo xtask test`, `cargo xtask check-driver`.
+//! Chores of the workspace: `cargo xtask render`, `cargo xtask test`, `cargo xtask atlas`, `cargo xtask check-driver`.
 //!
 //! Rendering and the tests need a Vulkan driver on Linux. A machine without a graphics card can use Mesa's software driver, which the
 //! chores offer to install.
@@ -25,6 +25,8 @@ Examples:
       Install a missing driver without asking.
   cargo xtask test
       Every test of the workspace.
+  cargo xtask atlas
+      The figures and tables of docs/lobes.
   cargo xtask check-driver
       Say whether a Vulkan driver is there.
 
@@ -55,6 +57,14 @@ enum Chore {
         #[command(flatten)]
         consent: Consent,
     },
+    /// Draw the error atlas of docs/lobes anew, and refresh its table of the WGSL functions.
+    Atlas {
+        #[command(flatten)]
+        consent: Consent,
+        /// Arguments for the atlas program; `-- --help` lists them.
+        #[arg(last = true, value_name = "ARGUMENTS")]
+        extra: Vec<OsString>,
+    },
     /// Say whether a Vulkan loader and driver are there; exit code 1 if not. Installs nothing.
     CheckDriver,
 }
@@ -71,6 +81,7 @@ fn main() -> ExitCode {
     let outcome = match Arguments::parse().chore {
         Chore::Render { consent, extra } => render(&consent, &extra),
         Chore::Test { consent } => test(&consent),
+        Chore::Atlas { consent, extra } => atlas(&consent, &extra),
         Chore::CheckDriver => check_driver(),
     };
     outcome.unwrap_or_else(|message| {
@@ -103,6 +114,14 @@ fn test(consent: &Consent) -> Result<ExitCode, String> {
     if in_ci() {
         command.env("LOBELIA_REQUIRE_GPU", "1");
     }
+    run(&mut command).map(exit_code)
+}
+
+/// Draws the atlas; its table needs a device.
+fn atlas(consent: &Consent, extra: &[OsString]) -> Result<ExitCode, String> {
+    ensure_driver(consent)?;
+    let mut command = cargo(&workspace_root()?);
+    command.args(["run", "-p", "lobelia-atlas", "--"]).args(extra);
     run(&mut command).map(exit_code)
 }
 

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use glam::{DQuat, DVec3};
-use lobelia_lobes::{asg::*, asg_product::*, cosine_lobe::*, quadrature::*, sg::*, sg_cosine::*};
+use lobelia_lobes::{asg::*, asg_product::*, cosine_lobe::*, lobe_similarity::*, quadrature::*, sg::*, sg_cosine::*};
 use proptest::prelude::*;
 use std::f64::consts::PI;
 
@@ -38,6 +38,9 @@ fn same(left: f64, right: f64) -> bool {
     left == right || (left - right).abs() <= 1e-9 * (1.0 + left.abs().max(right.abs()))
 }
 
+/// Something of two lobes.
+type Form = fn(DVec3, f64, DVec3, f64) -> f64;
+
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
@@ -72,6 +75,22 @@ proptest! {
         let (still, turned) = (log_sg_product_integral(a, x, b, y), log_sg_product_integral(turn * a, x, turn * b, y));
         // Turning rounds the axes, which a sharp lobe feels.
         prop_assert!((still - turned).abs() <= 1e-9 + 1e-14 * (x + y), "{} {}", still, turned);
+    }
+
+    #[test]
+    fn similarity_is_mutual_and_turns_with_the_lobes(a in direction(), b in direction(), x in sharpness(), y in sharpness(), turn in rotation()) {
+        let forms: [Form; 3] = [
+            lobe_similarity, lobe_similarity_exact, |a, x, b, y| lobe_similarity_weight(a, x, b, y, 20.0),
+        ];
+        for form in forms {
+            let value = form(a, x, b, y);
+            prop_assert!((0.0..=1.0 + 1e-12).contains(&value), "{}", value);
+            prop_assert!((value - form(b, y, a, x)).abs() <= 1e-12);
+            // Turning rounds the axes.
+            prop_assert!((value - form(turn * a, x, turn * b, y)).abs() <= 1e-12 + 1e-14 * (x + y));
+            prop_assert!((form(a, x, a, x) - 1.0).abs() <= 1e-12);
+        }
+        prop_assert!((diffuse_similarity(a, b) - diffuse_similarity(b, a)).abs() <= 1e-12 && (diffuse_similarity(a, a) - 1.0).abs() <= 1e-12);
     }
 
     #[test]
