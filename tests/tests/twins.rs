@@ -40,7 +40,7 @@ fn brdf_twins() {
     let Some(gpu) = gpu() else { return };
     for (distribution, phong) in [(Distribution::Ggx, false), (Distribution::Phong, true)] {
         let (mut rows, mut twins) = (Vec::new(), Vec::new());
-        for index in 0..60_000u32 {
+        for index in 0..100_000u32 {
             let [a, b] = r2_point(index, 1);
             let [c, d] = r2_point(index, 2);
             let [roughness, metallic] = r2_point(index, 3);
@@ -86,7 +86,7 @@ struct Output { encoded: vec4f, back: vec4f }
 fn evaluate(input: Input) -> Output {
     return Output(vec4f(octahedral_encode(input.v.xyz), 0.0, 0.0), vec4f(octahedral_unpack(octahedral_pack(input.v.xyz)), 0.0));
 }";
-    let directions: Vec<Vec3> = (0..50_000u32)
+    let directions: Vec<Vec3> = (0..100_000u32)
         .map(|index| {
             let [u, v] = r2_point(index, 0);
             let d = direction(u, v).as_vec3();
@@ -121,7 +121,7 @@ fn evaluate(input: Input) -> Output {
     return Output(vec4f(unpack_color(pack_color(input.color.xyz)), 0.0), vec4f(unpack_shared_exponent(pack_shared_exponent(input.color.xyz * input.color.w)), 0.0));
 }";
     let scales = [1e-4f32, 1.0, 37.0, 60_000.0];
-    let rows: Vec<[f32; 4]> = (0..40_000u32)
+    let rows: Vec<[f32; 4]> = (0..100_000u32)
         .map(|index| {
             let ([a, b], [c, _]) = (r2_point(index, 4), r2_point(index, 5));
             [a as f32, (b * b) as f32, c as f32, scales[index as usize % 4]]
@@ -150,7 +150,7 @@ fn evaluate(input: Input) -> Output {
     let point = r2_point(input.index, input.seed);
     return Output(hash(input.index), point.x, point.y, radical_inverse(input.index));
 }";
-    let rows: Vec<[u32; 2]> = (0..10_000u32).map(|index| [index.wrapping_mul(429_497), index % 5 * 1_000_003]).collect();
+    let rows: Vec<[u32; 2]> = (0..100_000u32).map(|index| [index.wrapping_mul(42_949), index % 5 * 1_000_003]).collect();
     let found: Vec<[u32; 4]> = evaluate(gpu, wgsl, &Flags::new(), &rows).unwrap();
     for ([index, seed], row) in rows.iter().zip(&found) {
         let point = r2_point(*index, *seed);
@@ -169,7 +169,7 @@ struct Output { aces: vec4f, agx: vec4f, srgb: vec4f }
 fn evaluate(input: Input) -> Output {
     return Output(vec4f(aces(input.color.xyz), 0.0), vec4f(agx(input.color.xyz), 0.0), vec4f(srgb_encode(input.color.xyz), 0.0));
 }";
-    let rows: Vec<[f32; 4]> = (0..20_000u32)
+    let rows: Vec<[f32; 4]> = (0..100_000u32)
         .map(|index| {
             let ([a, b], [c, d]) = (r2_point(index, 6), r2_point(index, 7));
             let scale = 10f64.powf(40.0 * d - 10.0);
@@ -203,7 +203,7 @@ fn evaluate(input: Input) -> Output {
     return Output(spot_falloff(PunctualLight(vec3f(0.0), 1u, vec3f(0.0), input.cos_outer, vec3f(1.0), input.scale), input.cosine));
 }";
     let (mut rows, mut expected) = (Vec::new(), Vec::new());
-    for index in 0..10_000u32 {
+    for index in 0..100_000u32 {
         let ([a, b], [c, _]) = (r2_point(index, 8), r2_point(index, 9));
         let outer = (0.01 + 1.55 * a).min(std::f64::consts::FRAC_PI_2 - 1e-4);
         let inner = if index % 7 == 0 { outer } else { outer * b };

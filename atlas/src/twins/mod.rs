@@ -2,6 +2,7 @@
 
 mod asg;
 mod averaged_direction;
+mod brdf;
 mod cosine_lobe;
 mod lobe_similarity;
 mod microfacet_lobe;
@@ -22,6 +23,7 @@ pub fn all() -> Vec<Twin> {
         averaged_direction::twins,
         sg_light::twins,
         lobe_similarity::twins,
+        brdf::twins,
         microfacet_lobe::twins,
         sampling::twins,
     ];
