@@ -59,7 +59,8 @@ fn value(input: Input) -> vec4f { return vec4f(phong_distribution(input.a.w, inp
                 let bound =
                     3e-6 + 1e-6 * log + 0.5 * exponent * sine_error(row) / (1.0 - s2).max(1e-7) + 3e-7 * (-s2).ln_1p().abs().min(69.0);
                 let value = phong_distribution(alpha, n, h);
-                // Next to the surface all that is left of cos^2 is a rounding error; the value is that of any cosine as small.
+                // Next to the surface all that is left of cos^2 is a rounding error, or nothing (e^-69): the value is that of any cosine as small.
+                let bound = bound + if s2 > 0.9999 { 35.0 * exponent } else { 0.0 };
                 let cosine_squared = (1.0 - s2).max(0.0) + if s2 > 0.9999 { 1e-6 } else { 0.0 };
                 let scale = (exponent + 2.0) / (2.0 * std::f64::consts::PI) * cosine_squared.powf(0.5 * exponent);
                 vec![Expected::scaled(value, value.max(scale).max(1e-30), bound).non_negative()]
