@@ -6,6 +6,7 @@
 mod image_file;
 mod mask;
 mod metric;
+pub mod timing;
 
 pub use image_file::{Precision, WriteSeek, read_exr, replace_file, write_exr, write_exr_with, write_png};
 pub use mask::Mask;
