@@ -11,7 +11,8 @@ use std::hint::black_box;
 fn main() {
     let forms = forms();
     let cases = cases(1024);
-    let mut criterion = Criterion::default().configure_from_args();
+    // Plots would be lettered by the atlas's font library, which has no font here.
+    let mut criterion = Criterion::default().without_plots().configure_from_args();
     for form in &forms {
         let mut next = cases.iter().cycle();
         criterion.bench_function(&format!("{}/{}", form.operation, form.function), |bencher| {

@@ -132,7 +132,7 @@ pub fn forms() -> Vec<Form> {
             |case| asg_sg_integral(case.sharpness[0], case.sharpness[1], case.axes[1], case.sharpness[2])
         ),
         form!(
-            "sharpness of an averaged direction",
+            "averaged direction",
             "averaged_direction",
             sharpness_from_averaged_direction_toksvig,
             "0.5 + 0.5 * at.cosine, 0.75 - at.cosine * (0.5 + 0.25 * at.cosine)",
@@ -140,7 +140,7 @@ pub fn forms() -> Vec<Form> {
             |case| sharpness_from_averaged_direction_toksvig(length(case), 1.0 - length(case).powi(2))
         ),
         form!(
-            "sharpness of an averaged direction",
+            "averaged direction",
             "averaged_direction",
             sharpness_from_averaged_direction_banerjee,
             "0.5 + 0.5 * at.cosine, 0.75 - at.cosine * (0.5 + 0.25 * at.cosine)",
@@ -148,7 +148,7 @@ pub fn forms() -> Vec<Form> {
             |case| sharpness_from_averaged_direction_banerjee(length(case), 1.0 - length(case).powi(2))
         ),
         form!(
-            "sharpness of an averaged direction",
+            "averaged direction",
             "averaged_direction",
             sharpness_from_averaged_direction,
             "0.5 + 0.5 * at.cosine, 0.75 - at.cosine * (0.5 + 0.25 * at.cosine)",

@@ -2,6 +2,7 @@
 
 pub mod adapters;
 pub mod check;
+pub mod compare;
 pub mod explain;
 pub mod passes;
 pub mod reference;

@@ -22,6 +22,7 @@ pub use lobelia_graph as graph;
 pub use lobelia_lobes as lobes;
 pub use lobelia_measure as measure;
 pub use lobelia_reference as reference;
+pub use lobelia_report as report;
 pub use lobelia_rsm as rsm;
 pub use lobelia_scene as scene;
 pub use lobelia_shaders as shaders;
@@ -30,6 +31,8 @@ pub use lobelia_vpl as vpl;
 
 pub mod explain;
 mod session;
+pub mod trial;
+pub mod truth;
 
 pub use session::{Picture, Rendering, Session, SessionError, SessionOptions, Shot, Step};
 

@@ -16,6 +16,7 @@ use std::process::ExitCode;
 Examples:
   lobelia render graphs/indirect.ron --scene builtin:cornell-glossy -o out.png
   lobelia render graphs/indirect.ron --scene room.glb --variant no-visibility --set lights.count=4096 -o out.exr
+  lobelia compare graphs/indirect.ron graphs/indirect.ron:no-visibility --report out
   lobelia reference --scene builtin:cornell-glossy --paths one-bounce --error 0.02 -o truth.exr
   lobelia explain graphs/indirect.ron --scene builtin:cornell-diffuse
   lobelia passes vpl-gather
@@ -30,6 +31,8 @@ struct Arguments {
 enum Command {
     /// Render a scene through a graph.
     Render(Box<commands::render::Arguments>),
+    /// Render several techniques, measure each against the truth, and write a page about it.
+    Compare(Box<commands::compare::Arguments>),
     /// Path-trace the truth on the CPU.
     Reference(commands::reference::Arguments),
     /// List passes, or describe one: ports, parameters, units, ranges, defaults.
@@ -55,6 +58,7 @@ fn main() -> ExitCode {
     // A reader that goes away (`lobelia passes | head`) is no reason to panic.
     let outcome = match Arguments::parse().command {
         Command::Render(arguments) => commands::render::run(&arguments),
+        Command::Compare(arguments) => commands::compare::run(&arguments),
         Command::Reference(arguments) => commands::reference::run(&arguments),
         Command::Passes(arguments) => commands::passes::run(&arguments),
         Command::Explain(arguments) => commands::explain::run(&arguments),

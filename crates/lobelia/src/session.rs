@@ -279,6 +279,11 @@ impl Rendering<'_> {
         &self.session.gpu
     }
 
+    /// `pass.port` of the radiance that the graph ends in, or that its display image shows; `None` where it ends in something else.
+    pub fn linear_output(&self) -> Option<String> {
+        self.linear.clone()
+    }
+
     /// What each frame took so far.
     pub fn reports(&self) -> &[FrameReport] {
         &self.reports

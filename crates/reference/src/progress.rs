@@ -200,8 +200,8 @@ impl Render {
         self.state.key.iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
-    /// Samples of one pass.
-    fn pass_samples(&self) -> u64 {
+    /// Samples per pixel of one pass.
+    pub fn pass_samples(&self) -> u64 {
         self.settings.samples.min(PASS_SAMPLES)
     }
 

@@ -7,12 +7,12 @@ use indicatif::{ProgressBar, ProgressStyle};
 use lobelia::{
     Session,
     measure::Image,
-    reference::{Checkpoint, LightPaths, Picture, ReferenceError, Render, Settings},
+    reference::{LightPaths, Picture, ReferenceError, Render, Settings},
+    truth::{self, Goal, Growth},
 };
 use std::{
     io::Write,
     path::{Path, PathBuf},
-    time::{Duration, Instant},
 };
 
 /// Path-trace the truth on the CPU.
@@ -83,7 +83,8 @@ impl Paths {
     }
 }
 
-fn parse_error(text: &str) -> Result<f64, String> {
+/// A relative error.
+pub fn parse_error(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(error) if error.is_finite() && error > 0.0 => Ok(error),
         _ => Err("it must be a number above 0, such as 0.02 for 2 %".into()),
@@ -99,13 +100,6 @@ impl From<ReferenceError> for Failure {
     }
 }
 
-/// How often the checkpoint is written.
-const CHECKPOINT: Duration = Duration::from_secs(10);
-
-/// Samples where neither --spp nor --error is given, and the most with --error alone.
-const DEFAULT_SAMPLES: u64 = 256;
-const MOST_SAMPLES: u64 = 1 << 20;
-
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     files::kind_of(&arguments.output, &[Kind::Exr])?;
     files::check_folder(&arguments.output)?;
@@ -116,14 +110,21 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
     }
     let camera = scene.camera(arguments.camera.as_deref()).map_err(lobelia::SessionError::from)?;
-    let samples = arguments.spp.unwrap_or(if arguments.error.is_some() { MOST_SAMPLES } else { DEFAULT_SAMPLES });
-    let settings = Settings { size: arguments.size, paths: arguments.paths.with_depth(arguments.depth), samples, seed: arguments.seed };
+    let goal = Goal::new(arguments.spp, arguments.error);
+    let paths = arguments.paths.with_depth(arguments.depth);
+    let settings = Settings { size: arguments.size, paths, samples: goal.samples, seed: arguments.seed };
     let mut render = Render::new(&scene, &camera, settings)?;
     let checkpoint = arguments.output.with_extension("checkpoint");
     resume(&mut render, &checkpoint, arguments.quiet)?;
+    if render.done() > render.passes() {
+        let what = format!("{} holds more samples than --spp asks for; remove it to begin anew", checkpoint.display());
+        return Err(Failure::Input(what));
+    }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.unwrap_or(0).into()).build();
     let pool = pool.map_err(|error| Failure::Run(format!("cannot start threads: {error}")))?;
-    let picture = grow(arguments, &mut render, &pool, &checkpoint)?;
+    let bar = growth_bar(arguments.quiet, render.passes());
+    let picture = pool.install(|| truth::grow(&mut render, &goal, Some(&checkpoint), &mut |growth| show_growth(&bar, growth)))?;
+    bar.finish_and_clear();
     files::write_exr(&arguments.output, &image(&picture, &picture.pixels))?;
     files::write_exr(&arguments.output.with_extension("variance.exr"), &image(&picture, &picture.variance))?;
     if checkpoint.exists() {
@@ -137,7 +138,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             arguments.output.display(),
             picture.samples,
             100.0 * error,
-            settings.paths
+            paths
         )?;
         if picture.dropped > 0 {
             eprintln!("warning: {} samples were not finite and count as black", picture.dropped);
@@ -148,54 +149,29 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 /// Goes on from a checkpoint of the same picture; one of another picture is refused, so that it is not overwritten unseen.
 fn resume(render: &mut Render, checkpoint: &Path, quiet: bool) -> Result<(), Failure> {
-    if !checkpoint.exists() {
-        return Ok(());
-    }
-    let outcome = Checkpoint::load(checkpoint).and_then(|state| render.resume(state, checkpoint));
-    outcome.map_err(|error| Failure::Input(format!("{error}; remove the file to begin anew")))?;
-    if !quiet {
+    truth::resume(render, checkpoint).map_err(|error| Failure::Input(format!("{error}; remove the file to begin anew")))?;
+    if render.done() > 0 && !quiet {
         eprintln!("going on from {} after {} passes", checkpoint.display(), render.done());
     }
     Ok(())
 }
 
-fn grow(arguments: &Arguments, render: &mut Render, pool: &rayon::ThreadPool, checkpoint: &Path) -> Result<Picture, Failure> {
-    let bar = if arguments.quiet { ProgressBar::hidden() } else { ProgressBar::new(render.passes()) };
+/// A bar for a growing reference, on standard error if that is a terminal.
+pub fn growth_bar(quiet: bool, passes: u64) -> ProgressBar {
+    let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(passes) };
     if let Ok(style) = ProgressStyle::with_template("{bar:32} {percent:>3} %  {elapsed_precise} (left {eta})  {msg}") {
         bar.set_style(style);
     }
-    bar.set_position(render.done());
-    let mut saved = Instant::now();
-    // The spread of passes says nothing before there are a few of them.
-    const LEAST: u64 = 4;
-    while render.done() < render.passes() {
-        pool.install(|| render.step());
-        let done = render.done();
-        // At fixed passes, so that where a picture stops does not depend on who watches.
-        let check = done >= LEAST && (done.is_power_of_two() || done % 8 == 0);
-        if check || !bar.is_hidden() {
-            let picture = render.picture();
-            let error = picture.relative_noise().sqrt();
-            // To halve the error takes four times the passes: the bar counts towards what is left at that rate.
-            if let Some(goal) = arguments.error
-                && check
-            {
-                let needed = (done as f64 * (error / goal).powi(2)).ceil() as u64;
-                bar.set_length(needed.clamp(done, render.passes()));
-                if error <= goal {
-                    break;
-                }
-            }
-            bar.set_message(format!("{} samples, relative error {:.2} %", picture.samples, 100.0 * error));
-        }
-        bar.set_position(done);
-        if saved.elapsed() >= CHECKPOINT {
-            render.checkpoint().save(checkpoint)?;
-            saved = Instant::now();
-        }
-    }
-    bar.finish_and_clear();
-    Ok(render.picture())
+    bar
+}
+
+/// Shows how far a reference is.
+pub fn show_growth(bar: &ProgressBar, growth: &Growth) -> bool {
+    bar.set_length(growth.expected);
+    bar.set_position(growth.done);
+    let error = growth.error.map(|error| format!(", relative error {:.2} %", 100.0 * error)).unwrap_or_default();
+    bar.set_message(format!("reference: {} samples{error}", growth.samples));
+    true
 }
 
 fn image(picture: &Picture, pixels: &[[f32; 3]]) -> Image {

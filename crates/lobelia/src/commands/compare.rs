@@ -1,0 +1,431 @@
+use super::{
+    SceneArguments, parse_size,
+    reference::{Paths, growth_bar, parse_error, show_growth},
+};
+use crate::{failure::Failure, files};
+use comfy_table::{CellAlignment, Table, presets};
+use indicatif::{ProgressBar, ProgressStyle};
+use lobelia::{
+    Session, Shot,
+    graph::{Override, Timing},
+    lobes,
+    measure::{Image, read_exr, timing::Ratio},
+    report::{Comparison, PassCost, PassDifference, Picture, Variant, comparison_page},
+    trial::{self, Measured, Technique, TrialOptions},
+    truth::{self, Goal},
+};
+use std::{
+    collections::BTreeMap,
+    io::Write,
+    path::{Path, PathBuf},
+};
+
+/// Render several techniques, measure each against the truth, and write a page about it.
+///
+/// Every technique is a graph, or a variant of one: graphs/indirect.ron:vpl+no-visibility. They are rendered in turn, so that a machine that is busy for a while is
+/// busy for all of them. The truth is path-traced, kept in the user's cache folder and never rendered twice (LOBELIA_CACHE names another folder); --reference takes
+/// a file instead. DIR gets report.html (one file, works without a network), report.json, and the pictures as EXR.
+#[derive(clap::Args, Clone, Debug)]
+#[command(after_help = "\
+Examples:
+  lobelia compare graphs/indirect.ron graphs/indirect.ron:no-visibility --scene builtin:cornell-glossy --report out
+  lobelia compare graphs/indirect.ron:vpl graphs/indirect.ron:interleaved --output indirect.radiance --paths one-bounce --report out
+  lobelia compare graphs/direct.ron --scene room.glb --reference truth.exr --size 640x360 --report out")]
+pub struct Arguments {
+    /// Graph file, with variants after a colon: FILE[:VARIANT[+VARIANT]].
+    #[arg(value_name = "GRAPH", required = true)]
+    techniques: Vec<String>,
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// Override a parameter in every graph: PASS.PARAM=VALUE.
+    #[arg(long = "set", value_name = "PASS.PARAM=VALUE")]
+    overrides: Vec<Override>,
+    #[command(flatten)]
+    truth: TruthArguments,
+    #[command(flatten)]
+    shot: ShotArguments,
+    /// Folder for the report; made if it does not exist.
+    #[arg(long, value_name = "DIR")]
+    report: PathBuf,
+    /// Print nothing but errors.
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// What is the truth.
+#[derive(clap::Args, Clone, Debug)]
+pub struct TruthArguments {
+    /// Picture to compare with (.exr, linear RGB) instead of a path-traced one.
+    #[arg(long, value_name = "R.exr")]
+    pub reference: Option<PathBuf>,
+    /// Light in the path-traced reference. What a whole graph makes is `full` up to --depth; a pass that makes direct or one-bounce light is compared with that.
+    #[arg(long, value_enum, default_value_t = Paths::Full)]
+    pub paths: Paths,
+    /// Most scattering events of the reference's paths, for --paths full. 2 is direct light and one bounce.
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub depth: u32,
+    /// Samples per pixel of the reference; with --reference-error, the most that are taken.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=u64::from(u32::MAX)))]
+    pub reference_spp: Option<u64>,
+    /// Relative error at which the reference is good enough; 0.1 if neither this nor --reference-spp is given.
+    #[arg(long, value_name = "E", value_parser = parse_error)]
+    pub reference_error: Option<f64>,
+}
+
+impl TruthArguments {
+    /// When the path-traced reference is good enough.
+    pub fn goal(&self) -> Goal {
+        let neither = self.reference_spp.is_none() && self.reference_error.is_none();
+        Goal::new(self.reference_spp, self.reference_error.or(neither.then_some(0.1)))
+    }
+}
+
+/// What is rendered.
+#[derive(clap::Args, Clone, Debug)]
+pub struct ShotArguments {
+    /// Compare this radiance of the graphs instead of what they end in.
+    #[arg(long, value_name = "PASS.PORT")]
+    pub output: Option<String>,
+    /// Camera of the scene; its first if none is named.
+    #[arg(long, value_name = "NAME")]
+    pub camera: Option<String>,
+    /// Size of the pictures in pixels.
+    #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "480x270")]
+    pub size: [u32; 2],
+    /// Average this many sub-pixel-jittered frames in linear radiance; edges need 16 to be compared with a reference.
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub samples: u32,
+    /// Seed of everything random in the techniques.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u32,
+    /// Render every technique this many times, in turn, for its times; the first round warms up.
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub rounds: u32,
+    /// Use the device whose name contains this.
+    #[arg(long, value_name = "NAME")]
+    pub adapter: Option<String>,
+    /// Use only what every WebGPU device has.
+    #[arg(long)]
+    pub baseline: bool,
+}
+
+impl ShotArguments {
+    /// The shot without timing, which the trial decides.
+    pub fn shot(&self) -> Shot {
+        Shot { extent: self.size, camera: self.camera.clone(), samples: self.samples, seed: self.seed, ..Shot::default() }
+    }
+
+    /// How a trial is run.
+    pub fn trial(&self) -> TrialOptions {
+        TrialOptions { adapter: self.adapter.clone(), baseline: self.baseline, rounds: self.rounds, output: self.output.clone() }
+    }
+}
+
+/// A reference, and what is known of its noise.
+pub struct Known {
+    pub image: Image,
+    pub note: String,
+}
+
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    make_folder(&arguments.report)?;
+    let registry = lobelia::registry();
+    let mut techniques = Vec::new();
+    for text in &arguments.techniques {
+        techniques.push(trial::technique(text, &arguments.overrides, &registry)?);
+    }
+    name_apart(&mut techniques);
+    let scene = Session::load(&arguments.scene.scene, &arguments.scene.options())?;
+    // Everything that can be wrong with the input is found before the long work.
+    let shot = arguments.shot.shot();
+    scene.camera(shot.camera.as_deref()).map_err(lobelia::SessionError::from)?;
+    let mut options = shot.plan_options();
+    options.keep.extend(arguments.shot.output.clone());
+    for technique in &techniques {
+        technique.wired.plan(&scene.traits(), &options)?;
+    }
+    if !arguments.quiet {
+        for warning in &scene.warnings {
+            eprintln!("warning: {warning}");
+        }
+    }
+    let known = reference(&scene, &arguments.truth, &arguments.shot, arguments.quiet)?;
+    let bar = trial_bar(arguments.quiet);
+    let measured = trial::run(&scene, &techniques, &shot, &arguments.shot.trial(), &mut |step| show_trial(&bar, step, &shot))?;
+    bar.finish_and_clear();
+    write(arguments, &scene, &known, &measured)
+}
+
+/// Techniques of the same name would be one row; later ones get a number.
+fn name_apart(techniques: &mut [Technique]) {
+    for index in 1..techniques.len() {
+        let taken = |name: &str, before: &[Technique]| before.iter().any(|technique| technique.name == name);
+        let own = techniques[index].name.clone();
+        let mut number = 2;
+        while taken(&techniques[index].name, &techniques[..index]) {
+            techniques[index].name = format!("{own} ({number})");
+            number += 1;
+        }
+    }
+}
+
+/// Makes a folder and refuses one that cannot be written, before any work.
+pub fn make_folder(folder: &Path) -> Result<(), Failure> {
+    let fail = |error: std::io::Error| Failure::Input(format!("{}: {error}", folder.display()));
+    std::fs::create_dir_all(folder).map_err(fail)?;
+    tempfile::Builder::new().prefix(".lobelia-").tempfile_in(folder).map_err(fail)?;
+    Ok(())
+}
+
+/// The reference: a file, or path-traced.
+pub fn reference(scene: &lobelia::scene::Scene, truth: &TruthArguments, shot: &ShotArguments, quiet: bool) -> Result<Known, Failure> {
+    if let Some(file) = &truth.reference {
+        let image = read_exr(file).map_err(|error| Failure::Input(error.to_string()))?;
+        let size = [image.width, image.height];
+        if size != shot.size.map(|side| side as usize) {
+            let what =
+                format!("{}: it has {} x {} pixels, but --size is {} x {}", file.display(), size[0], size[1], shot.size[0], shot.size[1]);
+            return Err(Failure::Input(what));
+        }
+        return Ok(Known { image, note: format!("{}", file.display()) });
+    }
+    let camera = scene.camera(shot.camera.as_deref()).map_err(lobelia::SessionError::from)?;
+    let paths = truth.paths.with_depth(truth.depth);
+    let goal = truth.goal();
+    let bar = growth_bar(quiet, 1);
+    let cache = truth::cache_folder();
+    let found =
+        truth::truth(scene, &camera, shot.size, paths, REFERENCE_SEED, &goal, cache.as_deref(), &mut |growth| show_growth(&bar, growth))?;
+    bar.finish_and_clear();
+    let note =
+        format!("path-traced ({paths}), {} samples per pixel, relative MSE of its own noise {:.1e}", found.samples, found.relative_noise);
+    Ok(Known { image: found.image, note })
+}
+
+/// The techniques' seed must not choose another reference.
+const REFERENCE_SEED: u32 = 1;
+
+/// A bar for a trial.
+pub fn trial_bar(quiet: bool) -> ProgressBar {
+    let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(1) };
+    if let Ok(style) = ProgressStyle::with_template("{bar:32} {percent:>3} %  {elapsed_precise} (left {eta})  {msg}") {
+        bar.set_style(style);
+    }
+    bar
+}
+
+/// Shows how far a trial is.
+pub fn show_trial(bar: &ProgressBar, step: &trial::TrialStep<'_>, shot: &Shot) -> bool {
+    let within = step.step.pass.as_ref().map_or(0.0, |(_, done)| f64::from(*done));
+    let samples = f64::from(shot.samples);
+    let done = step.done as f64 + (f64::from(step.step.sample) + within) / samples;
+    bar.set_length(step.total as u64 * 1000);
+    bar.set_position((done * 1000.0) as u64);
+    let pass = step.step.pass.as_ref().map(|(name, _)| format!(", {name}")).unwrap_or_default();
+    bar.set_message(format!("{}{pass}", step.technique));
+    true
+}
+
+/// Metrics by name, for tables and files.
+pub fn metrics(image: &Image, reference: &Image) -> Result<BTreeMap<String, f64>, Failure> {
+    let fail = |error: lobelia::measure::MeasureError| Failure::Run(error.to_string());
+    let mut found = BTreeMap::new();
+    found.insert("relative_mse".to_owned(), lobelia::measure::relative_mse(reference, image).map_err(fail)?);
+    found.insert("rmse".to_owned(), lobelia::measure::rmse(reference, image).map_err(fail)?);
+    Ok(found)
+}
+
+/// Shows linear radiance as every picture of a report is shown: one exposure, the ACES curve, sRGB.
+pub struct Display {
+    exposure: f64,
+}
+
+impl Display {
+    /// Puts the mean luminance of the reference at middle grey.
+    pub fn for_reference(reference: &Image) -> Self {
+        let luminance = |pixel: &[f32; 3]| lobes::luminance(glam::DVec3::from(pixel.map(f64::from)));
+        let mean =
+            reference.pixels.iter().map(luminance).filter(|value| value.is_finite()).sum::<f64>() / reference.pixels.len().max(1) as f64;
+        Self { exposure: if mean > 0.0 { 0.18 / mean } else { 1.0 } }
+    }
+
+    /// An encoded PNG.
+    pub fn picture(&self, image: &Image) -> Result<Picture, Failure> {
+        let shown = |pixel: &[f32; 3]| {
+            let color = glam::DVec3::from(pixel.map(f64::from)) * self.exposure;
+            lobes::tonemap::aces(color).to_array().map(|value| (lobes::tonemap::srgb_encode(value.clamp(0.0, 1.0)) * 255.0).round() as u8)
+        };
+        let bytes: Vec<u8> = image.pixels.iter().flat_map(shown).collect();
+        encode(image.width, image.height, &bytes)
+    }
+}
+
+fn encode(width: usize, height: usize, rgb: &[u8]) -> Result<Picture, Failure> {
+    let mut png = Vec::new();
+    let encoder = image::codecs::png::PngEncoder::new(&mut png);
+    image::ImageEncoder::write_image(encoder, rgb, width as u32, height as u32, image::ExtendedColorType::Rgb8)
+        .map_err(|error| Failure::Run(format!("a picture cannot be encoded: {error}")))?;
+    Ok(Picture { width: width as u32, height: height as u32, png })
+}
+
+/// Error maps of the report: how far each pixel is off relative to the reference.
+fn error_picture(image: &Image, reference: &Image) -> Result<Picture, Failure> {
+    let mean = reference.pixels.as_flattened().iter().map(|value| f64::from(*value)).sum::<f64>() / (3 * reference.pixels.len()) as f64;
+    let colour = |(test, truth): (&[f32; 3], &[f32; 3])| {
+        let off =
+            test.iter().zip(truth).map(|(left, right)| f64::from(left - right).abs() / (f64::from(*right) + 0.1 * mean)).sum::<f64>() / 3.0;
+        // From 0.1 % (black) to 100 % (bright).
+        let share = if off.is_nan() { 1.0 } else { ((off.max(1e-9)).log10() + 3.0) / 3.0 };
+        let colour = colorous::INFERNO.eval_continuous(share.clamp(0.0, 1.0));
+        [colour.r, colour.g, colour.b]
+    };
+    let bytes: Vec<u8> = image.pixels.iter().zip(&reference.pixels).flat_map(colour).collect();
+    encode(image.width, image.height, &bytes)
+}
+
+const MEBIBYTE: f64 = (1u64 << 20) as f64;
+
+fn write(arguments: &Arguments, scene: &lobelia::scene::Scene, known: &Known, measured: &[Measured]) -> Result<(), Failure> {
+    let folder = &arguments.report;
+    files::write_exr(&folder.join("reference.exr"), &known.image)?;
+    let display = Display::for_reference(&known.image);
+    let mut variants = Vec::new();
+    for one in measured {
+        files::write_exr(&folder.join(format!("{}.exr", file_name(&one.name))), &one.image)?;
+        variants.push(variant(one, &measured[0], known, &display)?);
+    }
+    let differences = measured[1..].iter().flat_map(|other| {
+        trial::differences(&measured[0], other).into_iter().map(|difference| PassDifference {
+            pass: difference.pass,
+            a: measured[0].name.clone(),
+            b: other.name.clone(),
+            change: difference.change,
+            what: difference.what,
+        })
+    });
+    let comparison = Comparison {
+        title: format!("{} on {}", measured.iter().map(|one| one.name.as_str()).collect::<Vec<_>>().join(", "), arguments.scene.scene),
+        device: measured[0].device.clone(),
+        scene: facts(arguments, scene, known, measured),
+        command: std::env::args().collect::<Vec<_>>().join(" "),
+        reference: display.picture(&known.image)?,
+        differences: differences.collect(),
+        variants,
+    };
+    let page = comparison_page(&comparison);
+    write_text(&folder.join("report.html"), &page)?;
+    let json = serde_json::to_string_pretty(&comparison).map_err(|error| Failure::Run(error.to_string()))?;
+    write_text(&folder.join("report.json"), &json)?;
+    if !arguments.quiet {
+        print_table(&comparison, measured, known)?;
+        writeln!(std::io::stdout(), "wrote {}", folder.join("report.html").display())?;
+    }
+    Ok(())
+}
+
+/// Writes text so that it is whole or absent.
+pub fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
+    files::atomically(path, |file| file.write_all(text.as_bytes()).map_err(|error| error.to_string()))
+}
+
+/// A name without what file systems dislike.
+fn file_name(name: &str) -> String {
+    name.chars().map(|letter| if letter.is_ascii_alphanumeric() || "-_+.".contains(letter) { letter } else { '_' }).collect()
+}
+
+fn variant(one: &Measured, first: &Measured, known: &Known, display: &Display) -> Result<Variant, Failure> {
+    let mut settings = vec![("compared".to_owned(), one.output.clone())];
+    settings.extend(
+        one.passes.iter().filter(|pass| pass.params != "()").map(|pass| (format!("{} ({})", pass.name, pass.kind), pass.params.clone())),
+    );
+    settings.push(("pipelines compiled in".to_owned(), format!("{:.2} s", one.compile_seconds)));
+    if one.name != first.name
+        && let Some(ratio) = Ratio::paired(&one.round_ms, &first.round_ms)
+    {
+        settings.push((format!("time over {}", first.name), ratio_text(&ratio)));
+    }
+    let passes = one.passes.iter().map(|pass| {
+        let gpu = pass.gpu_ms;
+        PassCost {
+            name: pass.name.clone(),
+            median_ms: gpu.map_or(f64::NAN, |summary| summary.median),
+            p5_ms: gpu.map_or(f64::NAN, |summary| summary.p5),
+            p95_ms: gpu.map_or(f64::NAN, |summary| summary.p95),
+            mebibytes: pass.bytes as f64 / MEBIBYTE,
+            cpu_ms: pass.cpu_ms.map_or(f64::NAN, |summary| summary.median),
+        }
+    });
+    Ok(Variant {
+        name: one.name.clone(),
+        settings,
+        metrics: metrics(&one.image, &known.image)?,
+        picture: display.picture(&one.image)?,
+        error: error_picture(&one.image, &known.image)?,
+        flip: None,
+        passes: passes.collect(),
+        pruned: one.dropped.clone(),
+        total_ms: one.frame_ms.map_or(f64::NAN, |summary| summary.median),
+        total_mebibytes: one.bytes as f64 / MEBIBYTE,
+    })
+}
+
+fn ratio_text(ratio: &Ratio) -> String {
+    if ratio.count < 2 {
+        return format!("{:.2} (one round: no interval)", ratio.ratio);
+    }
+    format!("{:.2} (95 % between {:.2} and {:.2}, {} rounds)", ratio.ratio, ratio.interval.0, ratio.interval.1, ratio.count)
+}
+
+fn facts(arguments: &Arguments, scene: &lobelia::scene::Scene, known: &Known, measured: &[Measured]) -> Vec<(String, String)> {
+    let traits = scene.traits();
+    let size = arguments.shot.size;
+    let how = match measured[0].timing {
+        Timing::Off => "not taken",
+        Timing::Timestamps => "timestamps on the device",
+        Timing::Isolated => "wall clock, each pass alone",
+    };
+    [
+        ("scene", arguments.scene.scene.clone()),
+        ("camera", arguments.shot.camera.clone().unwrap_or_else(|| "the first".to_owned())),
+        ("size", format!("{} x {} pixels, {} sub-pixel samples", size[0], size[1], arguments.shot.samples)),
+        ("triangles", traits.triangles.to_string()),
+        (
+            "lights",
+            format!(
+                "{} without extent, {} with extent",
+                traits.punctual_lights(),
+                traits.quad_lights + traits.disk_lights + traits.sphere_lights
+            ),
+        ),
+        ("distribution of normals", scene.ndf.to_string()),
+        ("reference", known.note.clone()),
+        ("times", format!("{how}; {} rounds in turn, the first not counted", arguments.shot.rounds)),
+    ]
+    .map(|(name, value)| (name.to_owned(), value))
+    .to_vec()
+}
+
+fn print_table(comparison: &Comparison, measured: &[Measured], known: &Known) -> Result<(), Failure> {
+    let mut table = Table::new();
+    let names: Vec<&String> = comparison.variants.first().map(|variant| variant.metrics.keys().collect()).unwrap_or_default();
+    let mut header = vec!["technique".to_owned(), "device ms".to_owned(), "over the first".to_owned(), "MiB".to_owned()];
+    header.extend(names.iter().map(|name| (*name).clone()));
+    let columns = header.len();
+    table.load_style(presets::NOTHING).set_header(header);
+    for column in 1..columns {
+        if let Some(column) = table.column_mut(column) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    for (variant, one) in comparison.variants.iter().zip(measured) {
+        let ratio =
+            Ratio::paired(&one.round_ms, &measured[0].round_ms).map_or_else(|| "-".to_owned(), |ratio| format!("{:.2}", ratio.ratio));
+        let mut row = vec![variant.name.clone(), format!("{:.2}", variant.total_ms), ratio, format!("{:.2}", variant.total_mebibytes)];
+        row.extend(names.iter().map(|name| variant.metrics.get(*name).map_or_else(String::new, |value| format!("{value:.3e}"))));
+        table.add_row(row);
+    }
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{table}")?;
+    writeln!(out, "device: {}; reference: {}", comparison.device, known.note)?;
+    Ok(())
+}
