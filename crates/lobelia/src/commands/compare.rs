@@ -307,7 +307,7 @@ fn write(arguments: &Arguments, scene: &lobelia::scene::Scene, known: &Known, me
         title: format!("{} on {}", measured.iter().map(|one| one.name.as_str()).collect::<Vec<_>>().join(", "), arguments.scene.scene),
         device: measured[0].device.clone(),
         scene: facts(arguments, scene, known, measured),
-        command: std::env::args().collect::<Vec<_>>().join(" "),
+        command: std::iter::once("lobelia".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" "),
         reference: display.picture(&known.image)?,
         differences: differences.collect(),
         variants,
