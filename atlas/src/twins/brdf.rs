@@ -12,7 +12,7 @@ fn normal_and_half_vector(index: u32) -> Row {
     let mut draw = Draw::new(index, 100);
     let normal = draw.direction();
     let alpha = draw.log_between(1e-3, 1.0);
-    let angle = if draw.one_in(3) { draw.angle().min(1.5707) } else { (alpha * draw.between(0.0, 5.0)).atan() };
+    let angle = if draw.one_in(3) { draw.angle().min(1.57) } else { (alpha * draw.between(0.0, 5.0)).atan() };
     row([group(normal, alpha), group(draw.direction_at(normal, angle), 0.0), [0.0; 4], [0.0; 4]])
 }
 

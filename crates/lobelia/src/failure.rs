@@ -55,6 +55,24 @@ impl From<std::io::Error> for Failure {
 }
 
 impl Failure {
+    /// In one line, for a table of failures.
+    pub fn message(&self) -> String {
+        match self {
+            Failure::Graph(problems) => {
+                let place = |problem: &Problem| match &problem.span {
+                    Some(span) => {
+                        let (line, column) = problems.position(span.start);
+                        format!("{}:{line}:{column}: {}", problems.file, problem.message)
+                    }
+                    None => problem.message.clone(),
+                };
+                problems.problems.iter().map(place).collect::<Vec<_>>().join("; ")
+            }
+            Failure::Input(message) | Failure::Run(message) => message.clone(),
+            Failure::Pipe => "the reader of the output went away".into(),
+        }
+    }
+
     /// Prints the failure to standard error and gives the exit code: 2 for bad input, 1 for a failed run.
     pub fn report(&self) -> ExitCode {
         match self {

@@ -31,6 +31,7 @@ pub use lobelia_vpl as vpl;
 
 pub mod explain;
 mod session;
+pub mod sweep;
 pub mod trial;
 pub mod truth;
 

@@ -33,6 +33,8 @@ enum Command {
     Render(Box<commands::render::Arguments>),
     /// Render several techniques, measure each against the truth, and write a page about it.
     Compare(Box<commands::compare::Arguments>),
+    /// Run every combination of scenes, variants, parameters and seeds, and plot error against time.
+    Sweep(commands::sweep::Arguments),
     /// Path-trace the truth on the CPU.
     Reference(commands::reference::Arguments),
     /// List passes, or describe one: ports, parameters, units, ranges, defaults.
@@ -59,6 +61,7 @@ fn main() -> ExitCode {
     let outcome = match Arguments::parse().command {
         Command::Render(arguments) => commands::render::run(&arguments),
         Command::Compare(arguments) => commands::compare::run(&arguments),
+        Command::Sweep(arguments) => commands::sweep::run(&arguments),
         Command::Reference(arguments) => commands::reference::run(&arguments),
         Command::Passes(arguments) => commands::passes::run(&arguments),
         Command::Explain(arguments) => commands::explain::run(&arguments),

@@ -1,7 +1,7 @@
 //! Path-traced references: grown to a goal, kept on disk, never rendered twice.
 
 use lobelia_measure::Image;
-use lobelia_reference::{Checkpoint, LightPaths, Picture, ReferenceError, Render, Settings};
+use lobelia_reference::{Checkpoint, Picture, ReferenceError, Render, Settings};
 use lobelia_scene::{Camera, Scene};
 use std::{
     path::{Path, PathBuf},
@@ -128,14 +128,12 @@ pub struct Truth {
 pub fn truth(
     scene: &Scene,
     camera: &Camera,
-    size: [u32; 2],
-    paths: LightPaths,
-    seed: u32,
-    goal: &Goal,
+    settings: Settings,
+    error: Option<f64>,
     cache: Option<&Path>,
     step: &mut dyn FnMut(&Growth) -> bool,
 ) -> Result<Truth, ReferenceError> {
-    let settings = Settings { size, paths, samples: goal.samples, seed };
+    let goal = Goal { samples: settings.samples, error };
     let mut render = Render::new(scene, camera, settings)?;
     let file = cache.map(|folder| folder.join(format!("{}.checkpoint", render.key())));
     if let Some(file) = &file {
@@ -149,9 +147,10 @@ pub fn truth(
     let cached_passes = render.done();
     let enough = cached_passes >= render.passes()
         || (checks(cached_passes) && goal.error.is_some_and(|goal| render.picture().relative_noise().sqrt() <= goal));
-    let picture = if enough { render.picture() } else { grow(&mut render, goal, file.as_deref(), step)? };
+    let picture = if enough { render.picture() } else { grow(&mut render, &goal, file.as_deref(), step)? };
     let relative_noise = picture.relative_noise();
-    let image = Image { width: size[0] as usize, height: size[1] as usize, pixels: picture.pixels };
+    let [width, height] = settings.size.map(|side| side as usize);
+    let image = Image { width, height, pixels: picture.pixels };
     Ok(Truth { image, samples: picture.samples, relative_noise, cached_passes })
 }
 
@@ -159,6 +158,7 @@ pub fn truth(
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
+    use lobelia_reference::LightPaths;
 
     #[test]
     fn a_reference_is_rendered_once_and_refined_from_where_it_is() {
@@ -168,8 +168,8 @@ mod tests {
         let cache = folder.path().join("deep/cache");
         let of = |samples: u64, error: Option<f64>| {
             let mut steps = 0;
-            let goal = Goal { samples, error };
-            let truth = truth(&scene, &camera, [16, 16], LightPaths::Direct, 1, &goal, Some(&cache), &mut |_| {
+            let settings = Settings { size: [16, 16], paths: LightPaths::Direct, samples, seed: 1 };
+            let truth = truth(&scene, &camera, settings, error, Some(&cache), &mut |_| {
                 steps += 1;
                 true
             });

@@ -31,7 +31,7 @@ pub(crate) fn verdict(comparison: &Comparison) -> Verdict {
 /// Name of the metric that decides.
 pub(crate) fn deciding_metric(comparison: &Comparison) -> Option<String> {
     let names = metric_names(comparison);
-    let preferred = DECIDING.iter().find_map(|wanted| names.iter().find(|name| name.to_lowercase().contains(wanted)));
+    let preferred = DECIDING.iter().find_map(|wanted| names.iter().find(|name| name.to_lowercase().replace('_', " ").contains(wanted)));
     preferred.or(names.first()).cloned()
 }
 

@@ -10,6 +10,7 @@ use lobelia::{
     graph::{Override, Timing},
     lobes,
     measure::{Image, read_exr, timing::Ratio},
+    reference::Settings,
     report::{Comparison, PassCost, PassDifference, Picture, Variant, comparison_page},
     trial::{self, Measured, Technique, TrialOptions},
     truth::{self, Goal},
@@ -73,6 +74,16 @@ pub struct TruthArguments {
 }
 
 impl TruthArguments {
+    /// What a sweep asks for.
+    pub fn for_sweep(sweep: &lobelia::sweep::Sweep) -> Self {
+        let paths = match sweep.paths {
+            lobelia::sweep::Paths::Direct => Paths::Direct,
+            lobelia::sweep::Paths::OneBounce => Paths::OneBounce,
+            lobelia::sweep::Paths::Full => Paths::Full,
+        };
+        Self { reference: None, paths, depth: 2, reference_spp: None, reference_error: Some(sweep.reference_error) }
+    }
+
     /// When the path-traced reference is good enough.
     pub fn goal(&self) -> Goal {
         let neither = self.reference_spp.is_none() && self.reference_error.is_none();
@@ -194,8 +205,8 @@ pub fn reference(scene: &lobelia::scene::Scene, truth: &TruthArguments, shot: &S
     let goal = truth.goal();
     let bar = growth_bar(quiet, 1);
     let cache = truth::cache_folder();
-    let found =
-        truth::truth(scene, &camera, shot.size, paths, REFERENCE_SEED, &goal, cache.as_deref(), &mut |growth| show_growth(&bar, growth))?;
+    let settings = Settings { size: shot.size, paths, samples: goal.samples, seed: REFERENCE_SEED };
+    let found = truth::truth(scene, &camera, settings, goal.error, cache.as_deref(), &mut |growth| show_growth(&bar, growth))?;
     bar.finish_and_clear();
     let note =
         format!("path-traced ({paths}), {} samples per pixel, relative MSE of its own noise {:.1e}", found.samples, found.relative_noise);

@@ -1,0 +1,250 @@
+use super::compare::{ShotArguments, TruthArguments, make_folder, metrics, reference, trial_bar, write_text};
+use crate::failure::Failure;
+use comfy_table::{CellAlignment, Table, presets};
+use indicatif::ProgressBar;
+use lobelia::{
+    Session, SessionOptions,
+    graph::GraphFile,
+    measure::Image,
+    report::{self, SweepRow, cheapest_under_error, most_accurate_under_time, sweep_page},
+    sweep::{Cell, Row, Shard, Store, Sweep, SweepError, merge},
+    trial::{self, Technique},
+};
+use std::{
+    collections::HashMap,
+    io::Write,
+    path::{Path, PathBuf},
+};
+
+/// Run every combination of scenes, variants, parameters and seeds, and plot error against time.
+///
+/// DIR gets rows.jsonl, one line a run, and report.html. A sweep that was killed goes on where it was: no run is lost, none is repeated. A run that fails is recorded
+/// as failed and the rest goes on. --shard runs a part, so that many machines can share a sweep; --merge joins their folders.
+#[derive(clap::Args, Clone, Debug)]
+#[command(after_help = "\
+Examples:
+  lobelia sweep sweeps/lights.ron --report out
+  lobelia sweep sweeps/lights.ron --report out --target-error 0.01
+  lobelia sweep sweeps/lights.ron --report out/3 --shard 3/8
+  lobelia sweep --merge out/1 out/2 out/3 --report out/all
+
+A sweep file:
+  (
+      graph: \"graphs/indirect.ron\",
+      scenes: [\"builtin:cornell-glossy\", \"builtin:ring-caustic\"],
+      variants: [\"vpl\", \"interleaved\"],
+      parameters: {\"lights.count\": [256, 1024, 4096]},
+      seeds: [0, 1],
+  )
+See docs/sweeps.md for all of its fields, and for Slurm and Kubernetes.")]
+pub struct Arguments {
+    /// Sweep file (RON).
+    #[arg(value_name = "SWEEP.ron", required_unless_present = "merge", conflicts_with = "merge")]
+    sweep: Option<PathBuf>,
+    /// Join the rows of these folders instead of running anything.
+    #[arg(long, value_name = "DIR", num_args = 1..)]
+    merge: Vec<PathBuf>,
+    /// Run only every N-th combination, beginning with the I-th.
+    #[arg(long, value_name = "I/N", conflicts_with = "merge")]
+    shard: Option<Shard>,
+    /// Folder for the rows and the report; made if it does not exist.
+    #[arg(long, value_name = "DIR")]
+    report: PathBuf,
+    /// Metric on the vertical axis.
+    #[arg(long, value_name = "METRIC", default_value = "relative_mse")]
+    metric: String,
+    /// Name the cheapest setting whose error is at most this.
+    #[arg(long, value_name = "E")]
+    target_error: Option<f64>,
+    /// Name the most accurate setting that takes at most this many milliseconds.
+    #[arg(long, value_name = "MS")]
+    target_ms: Option<f64>,
+    /// Use the device whose name contains this.
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// Use only what every WebGPU device has.
+    #[arg(long)]
+    baseline: bool,
+    /// Print nothing but errors.
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+impl From<SweepError> for Failure {
+    fn from(error: SweepError) -> Self {
+        match error {
+            SweepError::File { .. } => Failure::Run(error.to_string()),
+            error => Failure::Input(error.to_string()),
+        }
+    }
+}
+
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    make_folder(&arguments.report)?;
+    if !arguments.merge.is_empty() {
+        let (sweep, rows, missing) = merge(&arguments.merge)?;
+        let mut lines = String::new();
+        for row in &rows {
+            lines.push_str(&serde_json::to_string(row).map_err(|error| Failure::Run(error.to_string()))?);
+            lines.push('\n');
+        }
+        write_text(&arguments.report.join("rows.jsonl"), &lines)?;
+        write_text(
+            &arguments.report.join("sweep.json"),
+            &serde_json::to_string_pretty(&sweep).map_err(|error| Failure::Run(error.to_string()))?,
+        )?;
+        if !missing.is_empty() && !arguments.quiet {
+            eprintln!(
+                "warning: {} of {} runs are in none of the folders, the first: {}",
+                missing.len(),
+                missing.len() + rows.len(),
+                missing[0].label()
+            );
+        }
+        return conclude(arguments, &rows);
+    }
+    // clap asks for one of the two.
+    let Some(file) = &arguments.sweep else { return Ok(()) };
+    let sweep = Sweep::load(file)?;
+    let mut store = Store::open(&arguments.report, &sweep)?;
+    let cells = sweep.share(arguments.shard);
+    let left: Vec<&Cell> = cells.iter().filter(|cell| !store.has(cell)).collect();
+    if left.len() < cells.len() && !arguments.quiet {
+        eprintln!("{} of {} runs are done; going on", cells.len() - left.len(), cells.len());
+    }
+    let bar = trial_bar(arguments.quiet);
+    bar.set_length(cells.len() as u64);
+    bar.set_position((cells.len() - left.len()) as u64);
+    let mut references = References::default();
+    for cell in left {
+        bar.set_message(cell.label());
+        let row = run_cell(arguments, &sweep, cell, &mut references, &bar);
+        store.add(row)?;
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    conclude(arguments, store.rows())
+}
+
+/// References of scenes that were needed so far. Scenes come one after another, so one is kept.
+#[derive(Default)]
+struct References(HashMap<String, Image>);
+
+/// A run; whatever goes wrong in it is its row.
+fn run_cell(arguments: &Arguments, sweep: &Sweep, cell: &Cell, references: &mut References, bar: &ProgressBar) -> Row {
+    let mut row = Row::new(cell);
+    if let Err(failure) = fill(arguments, sweep, cell, references, &mut row) {
+        let message = failure.message();
+        bar.suspend(|| eprintln!("failed: {}: {message}", cell.label()));
+        row.failed = Some(message);
+    }
+    row
+}
+
+fn fill(arguments: &Arguments, sweep: &Sweep, cell: &Cell, references: &mut References, row: &mut Row) -> Result<(), Failure> {
+    let wired = GraphFile::load(Path::new(&sweep.graph))?.wire(&lobelia::registry(), &cell.variants(), &cell.overrides())?;
+    let scene = Session::load(&cell.scene, &SessionOptions::default())?;
+    let shot_arguments = ShotArguments {
+        output: sweep.output.clone(),
+        camera: sweep.camera.clone(),
+        size: [sweep.size.0, sweep.size.1],
+        samples: sweep.samples,
+        seed: cell.seed,
+        rounds: sweep.rounds,
+        adapter: arguments.adapter.clone(),
+        baseline: arguments.baseline,
+    };
+    let shot = shot_arguments.shot();
+    // What is wrong with the graph on this scene is found before the reference is traced.
+    let mut options = shot.plan_options();
+    options.keep.extend(sweep.output.clone());
+    wired.plan(&scene.traits(), &options)?;
+    if !references.0.contains_key(&cell.scene) {
+        let truth = TruthArguments::for_sweep(sweep);
+        let known = reference(&scene, &truth, &shot_arguments, true)?;
+        references.0.clear();
+        references.0.insert(cell.scene.clone(), known.image);
+    }
+    let technique = Technique { name: cell.variant.clone(), wired };
+    let measured = trial::run(&scene, &[technique], &shot, &shot_arguments.trial(), &mut |_| true)?;
+    let [one] = measured.as_slice() else { return Ok(()) };
+    row.device = one.device.clone();
+    row.ms = one.frame_ms.map(|summary| summary.median);
+    row.mebibytes = Some(one.bytes as f64 / (1u64 << 20) as f64);
+    row.passes = one.passes.iter().map(|pass| (pass.name.clone(), pass.gpu_ms.map(|summary| summary.median))).collect();
+    if let Some(image) = references.0.get(&cell.scene) {
+        row.metrics = metrics(&one.image, image)?;
+    }
+    Ok(())
+}
+
+/// The page, and what it answers.
+fn conclude(arguments: &Arguments, rows: &[Row]) -> Result<(), Failure> {
+    if let Some(known) = rows.iter().find(|row| row.failed.is_none())
+        && !known.metrics.contains_key(&arguments.metric)
+    {
+        let names: Vec<&str> = known.metrics.keys().map(String::as_str).collect();
+        return Err(Failure::Input(format!("--metric {}: the rows have {}", arguments.metric, names.join(", "))));
+    }
+    let shown = |row: &Row| SweepRow {
+        scene: row.scene.clone(),
+        variant: if row.variant.is_empty() { "the graph as it is".to_owned() } else { row.variant.clone() },
+        parameters: row.parameters.clone(),
+        seed: row.seed.into(),
+        ms: row.ms.unwrap_or(f64::NAN),
+        error: row.metrics.get(&arguments.metric).copied().unwrap_or(f64::NAN),
+        failed: row.failed.clone(),
+    };
+    let devices: std::collections::BTreeSet<&str> = rows.iter().map(|row| row.device.as_str()).filter(|name| !name.is_empty()).collect();
+    let sweep = report::Sweep {
+        title: format!("{} runs", rows.len()),
+        device: devices.into_iter().collect::<Vec<_>>().join(", "),
+        rows: rows.iter().map(shown).collect(),
+        metric: arguments.metric.clone(),
+        target_error: arguments.target_error,
+        target_ms: arguments.target_ms,
+    };
+    write_text(&arguments.report.join("report.html"), &sweep_page(&sweep))?;
+    write_text(
+        &arguments.report.join("report.json"),
+        &serde_json::to_string_pretty(&sweep).map_err(|error| Failure::Run(error.to_string()))?,
+    )?;
+    if arguments.quiet {
+        return Ok(());
+    }
+    let overall = report::overall(&sweep.rows);
+    let points: Vec<(f64, f64)> = overall.iter().map(report::Configuration::point).collect();
+    let mut out = std::io::stdout().lock();
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING).set_header(["setting on the front", "ms", arguments.metric.as_str()]);
+    for column in 1..3 {
+        if let Some(column) = table.column_mut(column) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    let name = |index: usize| {
+        let one = &overall[index];
+        let parameters = one.parameters.iter().map(|(name, value)| format!(" {name}={value}"));
+        std::iter::once(one.variant.clone()).chain(parameters).collect::<String>()
+    };
+    for index in report::pareto_front(&points) {
+        table.add_row([name(index), format!("{:.2}", points[index].0), format!("{:.3e}", points[index].1)]);
+    }
+    writeln!(out, "{table}")?;
+    if let Some(error) = arguments.target_error {
+        let found = cheapest_under_error(&points, error);
+        let text = found.map_or_else(|| "none".to_owned(), |index| format!("{}, {:.2} ms", name(index), points[index].0));
+        writeln!(out, "cheapest with {} at most {error}: {text}", arguments.metric)?;
+    }
+    if let Some(ms) = arguments.target_ms {
+        let found = most_accurate_under_time(&points, ms);
+        let text = found.map_or_else(|| "none".to_owned(), |index| format!("{}, {:.3e}", name(index), points[index].1));
+        writeln!(out, "most accurate within {ms} ms: {text}")?;
+    }
+    let failed = rows.iter().filter(|row| row.failed.is_some()).count();
+    if failed > 0 {
+        writeln!(out, "{failed} of {} runs failed; report.html says why", rows.len())?;
+    }
+    writeln!(out, "wrote {}", arguments.report.join("report.html").display())?;
+    Ok(())
+}
