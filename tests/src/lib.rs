@@ -1,7 +1,11 @@
 //! What the pipeline tests share: the reference images, where they are present, and rendering in one call.
 
 use lobelia::{Session, Shot, graph::GraphFile, measure::Image, scene::Ndf};
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    process::Command,
+    sync::OnceLock,
+};
 
 /// Root of the workspace.
 pub fn root() -> PathBuf {
@@ -16,6 +20,25 @@ pub fn shared() -> Option<PathBuf> {
     }
     eprintln!("skipped: reference images are not here (set LOBELIA_SHARED)");
     None
+}
+
+/// The program, built once.
+///
+/// # Panics
+/// If it cannot be built.
+pub fn program() -> &'static Path {
+    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+    PROGRAM.get_or_init(|| {
+        let built = Command::new(env!("CARGO"))
+            .args(["build", "--quiet", "-p", "lobelia-lobelia", "--bin", "lobelia"])
+            .current_dir(root())
+            .status();
+        assert!(built.is_ok_and(|status| status.success()), "the program cannot be built");
+        // Beside the folder of this test.
+        let own = std::env::current_exe().unwrap_or_default();
+        let folder = own.parent().and_then(Path::parent).unwrap_or(Path::new("."));
+        folder.join(format!("lobelia{}", std::env::consts::EXE_SUFFIX))
+    })
 }
 
 /// The device, or a word that the test is skipped.

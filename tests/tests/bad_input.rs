@@ -1,28 +1,12 @@
 //! Bad input to the program: each row must end in its message and its exit code, without a panic and without a file left behind.
 #![allow(clippy::unwrap_used)]
 
+use lobelia_tests::program;
 use std::{
-    path::{Path, PathBuf},
+    path::Path,
     process::{Command, Output},
-    sync::{
-        OnceLock,
-        atomic::{AtomicUsize, Ordering},
-    },
+    sync::atomic::{AtomicUsize, Ordering},
 };
-
-/// The program, built once.
-fn program() -> &'static Path {
-    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    PROGRAM.get_or_init(|| {
-        let built = Command::new(env!("CARGO"))
-            .args(["build", "--quiet", "-p", "lobelia-lobelia", "--bin", "lobelia"])
-            .current_dir(lobelia_tests::root())
-            .status();
-        assert!(built.unwrap().success());
-        let folder = std::env::current_exe().unwrap().parent().and_then(Path::parent).unwrap().to_owned();
-        folder.join(format!("lobelia{}", std::env::consts::EXE_SUFFIX))
-    })
-}
 
 fn run(folder: &Path, arguments: &str) -> Output {
     let graphs = lobelia_tests::root().join("graphs");

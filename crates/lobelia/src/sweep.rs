@@ -92,19 +92,41 @@ impl Value {
     }
 }
 
-/// Names of [`LightPaths`].
+/// Names of [`LightPaths`]: `"direct"`, `"one-bounce"`, `"full"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(try_from = "String", into = "String")]
 pub enum Paths {
     /// Light that scatters exactly once.
-    #[serde(rename = "direct")]
     Direct,
     /// Light that scatters exactly twice.
-    #[serde(rename = "one-bounce")]
     OneBounce,
     /// Direct light, one bounce, emission and background: what a whole graph makes.
     #[default]
-    #[serde(rename = "full")]
     Full,
+}
+
+impl TryFrom<String> for Paths {
+    type Error = String;
+
+    fn try_from(name: String) -> Result<Self, String> {
+        match name.as_str() {
+            "direct" => Ok(Self::Direct),
+            "one-bounce" => Ok(Self::OneBounce),
+            "full" => Ok(Self::Full),
+            _ => Err(format!("`{name}` is none of \"direct\", \"one-bounce\", \"full\"")),
+        }
+    }
+}
+
+impl From<Paths> for String {
+    fn from(paths: Paths) -> Self {
+        match paths {
+            Paths::Direct => "direct",
+            Paths::OneBounce => "one-bounce",
+            Paths::Full => "full",
+        }
+        .to_owned()
+    }
 }
 
 impl From<Paths> for LightPaths {

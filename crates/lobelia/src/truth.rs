@@ -42,8 +42,21 @@ pub struct Growth {
     pub error: Option<f64>,
 }
 
-/// How often the checkpoint is written.
-const CHECKPOINT: Duration = Duration::from_secs(10);
+/// Where and how often the state of a growing reference is written.
+#[derive(Clone, Copy, Debug)]
+pub struct Keep<'a> {
+    /// File.
+    pub file: &'a Path,
+    /// Time between two writings.
+    pub every: Duration,
+}
+
+impl<'a> Keep<'a> {
+    /// Every ten seconds.
+    pub fn new(file: &'a Path) -> Self {
+        Self { file, every: Duration::from_secs(10) }
+    }
+}
 
 /// The spread of passes says nothing before there are a few of them.
 const LEAST: u64 = 4;
@@ -58,7 +71,7 @@ fn checks(done: u64) -> bool {
 pub fn grow(
     render: &mut Render,
     goal: &Goal,
-    checkpoint: Option<&Path>,
+    keep: Option<Keep<'_>>,
     step: &mut dyn FnMut(&Growth) -> bool,
 ) -> Result<Picture, ReferenceError> {
     let mut saved = Instant::now();
@@ -79,11 +92,11 @@ pub fn grow(
         }
         let go_on = step(&Growth { done, expected, samples: done * render.pass_samples(), error });
         let stop = !go_on || done >= render.passes();
-        if let Some(file) = checkpoint
+        if let Some(keep) = keep
             && done > 0
-            && (stop || saved.elapsed() >= CHECKPOINT)
+            && (stop || saved.elapsed() >= keep.every)
         {
-            render.checkpoint().save(file)?;
+            render.checkpoint().save(keep.file)?;
             saved = Instant::now();
         }
         if stop {
@@ -91,8 +104,8 @@ pub fn grow(
         }
         render.step();
     }
-    if let Some(file) = checkpoint {
-        render.checkpoint().save(file)?;
+    if let Some(keep) = keep {
+        render.checkpoint().save(keep.file)?;
     }
     Ok(render.picture())
 }
@@ -147,7 +160,7 @@ pub fn truth(
     let cached_passes = render.done();
     let enough = cached_passes >= render.passes()
         || (checks(cached_passes) && goal.error.is_some_and(|goal| render.picture().relative_noise().sqrt() <= goal));
-    let picture = if enough { render.picture() } else { grow(&mut render, &goal, file.as_deref(), step)? };
+    let picture = if enough { render.picture() } else { grow(&mut render, &goal, file.as_deref().map(Keep::new), step)? };
     let relative_noise = picture.relative_noise();
     let [width, height] = settings.size.map(|side| side as usize);
     let image = Image { width, height, pixels: picture.pixels };

@@ -8,11 +8,12 @@ use lobelia::{
     Session,
     measure::Image,
     reference::{LightPaths, Picture, ReferenceError, Render, Settings},
-    truth::{self, Goal, Growth},
+    truth::{self, Goal, Growth, Keep},
 };
 use std::{
     io::Write,
     path::{Path, PathBuf},
+    time::Duration,
 };
 
 /// Path-trace the truth on the CPU.
@@ -53,6 +54,9 @@ pub struct Arguments {
     /// Threads; all cores if not given.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+    /// Seconds between checkpoints.
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = parse_seconds)]
+    checkpoint: f64,
     /// Picture to write: .exr, linear RGB.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
@@ -80,6 +84,13 @@ impl Paths {
             Self::OneBounce => LightPaths::OneBounce,
             Self::Full => LightPaths::Full { depth },
         }
+    }
+}
+
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (0.0..=1e9).contains(&seconds) => Ok(seconds),
+        _ => Err("it must be a number from 0 on".into()),
     }
 }
 
@@ -123,7 +134,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.unwrap_or(0).into()).build();
     let pool = pool.map_err(|error| Failure::Run(format!("cannot start threads: {error}")))?;
     let bar = growth_bar(arguments.quiet, render.passes());
-    let picture = pool.install(|| truth::grow(&mut render, &goal, Some(&checkpoint), &mut |growth| show_growth(&bar, growth)))?;
+    let keep = Keep { file: &checkpoint, every: Duration::from_secs_f64(arguments.checkpoint) };
+    let picture = pool.install(|| truth::grow(&mut render, &goal, Some(keep), &mut |growth| show_growth(&bar, growth)))?;
     bar.finish_and_clear();
     files::write_exr(&arguments.output, &image(&picture, &picture.pixels))?;
     files::write_exr(&arguments.output.with_extension("variance.exr"), &image(&picture, &picture.variance))?;
