@@ -407,7 +407,7 @@ impl Store {
         if file.exists() {
             let text = std::fs::read_to_string(&file).map_err(fail(&file))?;
             let whole = &text[..text.rfind('\n').map_or(0, |end| end + 1)];
-            store.rows = parse_rows(whole, &file)?;
+            store.rows = parse_rows(whole, &file)?.into_iter().map(|(row, _)| row).collect();
             if whole.len() < text.len() {
                 std::fs::write(&file, whole).map_err(fail(&file))?;
             }
@@ -443,9 +443,9 @@ impl Store {
     }
 }
 
-fn parse_rows(text: &str, file: &Path) -> Result<Vec<Row>, SweepError> {
-    let line = |(index, line): (usize, &str)| {
-        serde_json::from_str(line).map_err(|error| SweepError::Syntax {
+fn parse_rows<'a>(text: &'a str, file: &Path) -> Result<Vec<(Row, &'a str)>, SweepError> {
+    let line = |(index, line): (usize, &'a str)| {
+        serde_json::from_str(line).map(|row| (row, line)).map_err(|error| SweepError::Syntax {
             file: file.display().to_string(),
             line: index + 1,
             column: error.column(),
@@ -455,15 +455,28 @@ fn parse_rows(text: &str, file: &Path) -> Result<Vec<Row>, SweepError> {
     text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()).map(line).collect()
 }
 
+/// What several folders hold together.
+#[derive(Clone, Debug)]
+pub struct Merged {
+    /// The sweep of all of them.
+    pub sweep: Sweep,
+    /// In the order of the product.
+    pub rows: Vec<Row>,
+    /// The same rows as they were written: numbers that are read and written again may change in their last digit.
+    pub lines: Vec<String>,
+    /// Runs that are in none of the folders.
+    pub missing: Vec<Cell>,
+}
+
 /// Joins the rows of several folders of one sweep, in the order of the product. A run that is in several folders counts once: the first that did not fail, or else the
-/// first. Says which runs are missing.
-pub fn merge(folders: &[PathBuf]) -> Result<(Sweep, Vec<Row>, Vec<Cell>), SweepError> {
+/// first.
+pub fn merge(folders: &[PathBuf]) -> Result<Merged, SweepError> {
     let fail = |file: &Path| {
         let file = file.to_owned();
         move |source| SweepError::File { file, source }
     };
     let mut sweep: Option<(Sweep, PathBuf)> = None;
-    let mut rows: BTreeMap<usize, Row> = BTreeMap::new();
+    let mut rows: BTreeMap<usize, (Row, String)> = BTreeMap::new();
     for folder in folders {
         let copy = folder.join("sweep.json");
         let text = std::fs::read_to_string(&copy).map_err(fail(&copy))?;
@@ -479,10 +492,10 @@ pub fn merge(folders: &[PathBuf]) -> Result<(Sweep, Vec<Row>, Vec<Cell>), SweepE
         }
         let file = folder.join("rows.jsonl");
         let text = if file.exists() { std::fs::read_to_string(&file).map_err(fail(&file))? } else { String::new() };
-        for row in parse_rows(&text, &file)? {
-            let better = rows.get(&row.cell).is_none_or(|there| there.failed.is_some() && row.failed.is_none());
+        for (row, line) in parse_rows(&text, &file)? {
+            let better = rows.get(&row.cell).is_none_or(|(there, _)| there.failed.is_some() && row.failed.is_none());
             if better {
-                rows.insert(row.cell, row);
+                rows.insert(row.cell, (row, line.to_owned()));
             }
         }
     }
@@ -491,7 +504,8 @@ pub fn merge(folders: &[PathBuf]) -> Result<(Sweep, Vec<Row>, Vec<Cell>), SweepE
     };
     let done: BTreeSet<usize> = rows.keys().copied().collect();
     let missing = sweep.cells().into_iter().filter(|cell| !done.contains(&cell.index)).collect();
-    Ok((sweep, rows.into_values().collect(), missing))
+    let (rows, lines) = rows.into_values().unzip();
+    Ok(Merged { sweep, rows, lines, missing })
 }
 
 #[cfg(test)]
@@ -558,11 +572,11 @@ mod tests {
         let mut store = Store::open(&folders[0], &sweep).unwrap();
         let lost: Vec<Cell> = sweep.share(Some(Shard { index: 1, count: 2 })).into_iter().filter(|cell| !store.has(cell)).collect();
         assert_eq!((store.rows().len(), lost.len()), (7, 1));
-        assert_eq!(merge(&folders).unwrap().2, lost);
+        assert_eq!(merge(&folders).unwrap().missing, lost);
         store.add(row(&lost[0])).unwrap();
-        let (_, merged, missing) = merge(&folders).unwrap();
-        assert!(missing.is_empty());
-        assert_eq!(merged, sweep.cells().iter().map(row).collect::<Vec<_>>());
+        let merged = merge(&folders).unwrap();
+        assert!(merged.missing.is_empty() && merged.lines.len() == 16);
+        assert_eq!(merged.rows, sweep.cells().iter().map(row).collect::<Vec<_>>());
         // Another sweep does not mix with this one.
         let other = Sweep { samples: 9, ..sweep.clone() };
         assert!(matches!(Store::open(&folders[0], &other), Err(SweepError::Content { .. })));
@@ -572,7 +586,7 @@ mod tests {
         // A run that failed in one folder and not in another is done.
         let mut failed = Store::open(&root.path().join("failed"), &sweep).unwrap();
         failed.add(Row { failed: Some("no".into()), ..Row::new(&sweep.cells()[0]) }).unwrap();
-        let (_, rows, _) = merge(&[root.path().join("failed"), folders[0].clone()]).unwrap();
+        let rows = merge(&[root.path().join("failed"), folders[0].clone()]).unwrap().rows;
         assert_eq!(rows[0].failed, None);
         // A broken line in the middle has a place.
         std::fs::write(&file, "{}\n").unwrap();

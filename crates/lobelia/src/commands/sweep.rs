@@ -82,26 +82,20 @@ impl From<SweepError> for Failure {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     make_folder(&arguments.report)?;
     if !arguments.merge.is_empty() {
-        let (sweep, rows, missing) = merge(&arguments.merge)?;
-        let mut lines = String::new();
-        for row in &rows {
-            lines.push_str(&serde_json::to_string(row).map_err(|error| Failure::Run(error.to_string()))?);
-            lines.push('\n');
-        }
+        let merged = merge(&arguments.merge)?;
+        let lines: String = merged.lines.iter().flat_map(|line| [line.as_str(), "\n"]).collect();
         write_text(&arguments.report.join("rows.jsonl"), &lines)?;
-        write_text(
-            &arguments.report.join("sweep.json"),
-            &serde_json::to_string_pretty(&sweep).map_err(|error| Failure::Run(error.to_string()))?,
-        )?;
-        if !missing.is_empty() && !arguments.quiet {
+        let sweep = serde_json::to_string_pretty(&merged.sweep).map_err(|error| Failure::Run(error.to_string()))?;
+        write_text(&arguments.report.join("sweep.json"), &sweep)?;
+        let missing = merged.missing.len();
+        if let (Some(first), false) = (merged.missing.first(), arguments.quiet) {
             eprintln!(
-                "warning: {} of {} runs are in none of the folders, the first: {}",
-                missing.len(),
-                missing.len() + rows.len(),
-                missing[0].label()
+                "warning: {missing} of {} runs are in none of the folders, the first: {}",
+                missing + merged.rows.len(),
+                first.label()
             );
         }
-        return conclude(arguments, &rows);
+        return conclude(arguments, &merged.rows);
     }
     // clap asks for one of the two.
     let Some(file) = &arguments.sweep else { return Ok(()) };
