@@ -64,6 +64,9 @@ impl Brdf {
         if n_dot_l <= 0.0 || n_dot_v <= 0.0 || sides <= 0.0 {
             return DVec3::ZERO;
         }
+        if self.reflectance_grazing == 0.0 && self.reflectance_normal == DVec3::ZERO {
+            return self.diffuse;
+        }
         let h = (l + v).normalize_or(n);
         let lobe = match self.distribution {
             Distribution::Ggx => ggx_distribution(self.alpha, n, h) * ggx_visibility(self.alpha, n_dot_l, n_dot_v),

@@ -1,6 +1,6 @@
 //! What rays meet: triangles through a bounding volume hierarchy, and lights of exact shape.
 
-use glam::{DVec3, Vec3A};
+use glam::{DMat3, DVec3, Vec3A};
 use lobelia_scene::{Scene, Triangle};
 use obvhs::{
     BvhBuildParams,
@@ -27,25 +27,61 @@ pub struct Hit {
     pub distance: f64,
 }
 
+/// A triangle's vertices and normal.
+#[derive(Clone, Copy, Debug)]
+pub struct Face {
+    /// Vertices in its mesh, in the order of the corners.
+    pub vertices: [u32; 3],
+    /// Unit, on the side of the front.
+    pub normal: DVec3,
+}
+
+/// How an instance turns directions.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame {
+    /// For tangents.
+    pub linear: DMat3,
+    /// For normals.
+    pub normal: DMat3,
+    /// Whether it mirrors.
+    pub mirrored: bool,
+}
+
 /// The surfaces of a scene that reflect. Area lights are not among them: their shapes are met exactly.
 pub struct Geometry {
     pub triangles: Vec<Triangle>,
-    /// Index of a triangle's first corner in its mesh's index list.
-    pub first_index: Vec<u32>,
+    /// What is known of each triangle before any ray meets it.
+    pub faces: Vec<Face>,
+    /// World directions from local ones, for each instance.
+    pub frames: Vec<Frame>,
     tree: CwBvh,
     tests: Vec<RtTriangle>,
 }
 
 impl Geometry {
     pub fn new(scene: &Scene) -> Self {
-        let mut first_index = Vec::new();
+        let frames: Vec<Frame> = scene
+            .instances
+            .iter()
+            .map(|instance| {
+                let linear = DMat3::from_mat4(instance.world_from_local);
+                Frame { linear, normal: linear.inverse().transpose(), mirrored: linear.determinant() < 0.0 }
+            })
+            .collect();
+        let mut faces = Vec::new();
         let mut kept = Vec::new();
         let mut within = (usize::MAX, 0);
         for triangle in scene.triangles() {
             within = if within.0 == triangle.instance { (within.0, within.1 + 3) } else { (triangle.instance, 0) };
-            if scene.instances[triangle.instance].area_light.is_none() {
+            let instance = &scene.instances[triangle.instance];
+            if instance.area_light.is_none() {
+                // Mirrored instances have two corners exchanged, as in `Scene::triangles`.
+                let order = if frames[triangle.instance].mirrored { [0, 2, 1] } else { [0, 1, 2] };
+                let indices = &scene.meshes[instance.mesh].indices;
+                let [a, b, c] = triangle.positions.map(|corner| corner.as_dvec3());
+                let normal = (b - a).cross(c - a).normalize_or(DVec3::Y);
+                faces.push(Face { vertices: order.map(|place| indices[within.1 + place]), normal });
                 kept.push(triangle);
-                first_index.push(within.1);
             }
         }
         let corners: Vec<obvhs::triangle::Triangle> = kept
@@ -57,7 +93,7 @@ impl Geometry {
             .collect();
         let tree = build_cwbvh_from_tris(&corners, BvhBuildParams::medium_build(), &mut Duration::default());
         let tests = tree.primitive_indices.iter().map(|index| RtTriangle::from(&corners[*index as usize])).collect();
-        Self { triangles: kept, first_index, tree, tests }
+        Self { triangles: kept, faces, frames, tree, tests }
     }
 
     /// The nearest triangle.
@@ -75,12 +111,6 @@ impl Geometry {
     /// Whether nothing is in the way.
     pub fn is_free(&self, segment: &Segment) -> bool {
         self.triangles.is_empty() || self.tree.ray_traverse_miss(ray(segment), |ray, index| self.tests[index].intersect(ray))
-    }
-
-    /// True normal of a triangle, on the side of its front.
-    pub fn true_normal(&self, triangle: usize) -> DVec3 {
-        let [a, b, c] = self.triangles[triangle].positions.map(|corner| corner.as_dvec3());
-        (b - a).cross(c - a).normalize_or(DVec3::Y)
     }
 
     /// Barycentric coordinates of the point of a triangle's plane that a ray meets, in `f64`, and that point: nearer to the plane than the `f32` hit.

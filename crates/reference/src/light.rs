@@ -32,6 +32,8 @@ struct Emitter {
     /// Local axes in scene space, their lengths included.
     axes: DMat3,
     radiance: DVec3,
+    /// Local coordinates from those about the centre.
+    inverse: DMat3,
     /// One factor for all three axes.
     uniform_scale: bool,
 }
@@ -73,6 +75,7 @@ impl Lights {
                     shape: light.shape,
                     centre: light.world_from_local.transform_point3(DVec3::ZERO) - origin,
                     axes,
+                    inverse: axes.inverse(),
                     radiance: light.radiance.as_dvec3(),
                     uniform_scale: even && square < 1e-6 * lengths[0] * lengths[0],
                 }
@@ -103,6 +106,11 @@ impl Lights {
     /// How many samples [`Lights::samples`] takes, so how many pairs of numbers it needs.
     pub fn count(&self) -> usize {
         self.punctual.len() + self.emitters.len() + usize::from(!self.triangles.is_empty()) + usize::from(self.sky.is_some())
+    }
+
+    /// Whether a light's sample is chosen by numbers: lights without extent leave no choice.
+    pub fn is_random(&self, index: usize) -> bool {
+        index >= self.punctual.len()
     }
 
     /// The sample of light `index` at a point; `None` where none of its light arrives.
@@ -182,7 +190,7 @@ impl Lights {
         let offset = point - position;
         let distance = offset.length();
         let direction = offset.try_normalize()?;
-        let cosine = -geometry.true_normal(triangle).dot(direction);
+        let cosine = -geometry.faces[triangle].normal.dot(direction);
         if cosine <= 0.0 {
             return None;
         }
@@ -268,7 +276,7 @@ impl Emitter {
         let pdf = self.pdf(position, direction, distance);
         // The far side of an ellipsoid is hidden by its near side.
         let faces = match self.shape {
-            AreaShape::Sphere { .. } => (self.axes.inverse().transpose() * local).dot(direction) < 0.0,
+            AreaShape::Sphere { .. } => (self.inverse.transpose() * local).dot(direction) < 0.0,
             AreaShape::Quad { .. } | AreaShape::Disk { .. } => self.facing().dot(direction) < 0.0,
         };
         (faces && pdf > 0.0 && pdf.is_finite()).then(|| LightSample {
@@ -314,9 +322,8 @@ impl Emitter {
             }
             AreaShape::Sphere { .. } => {
                 // Uniform over the unit sphere; an area element grows by |det M| |M^-T n|.
-                let inverse = self.axes.inverse();
-                let local = inverse * (position + direction * distance - self.centre);
-                let normal = inverse.transpose() * local.normalize_or(DVec3::Z);
+                let local = self.inverse * (position + direction * distance - self.centre);
+                let normal = self.inverse.transpose() * local.normalize_or(DVec3::Z);
                 let element = self.axes.determinant().abs() * normal.length();
                 let radius = self.half()[0];
                 let cosine = -normal.normalize_or(DVec3::Z).dot(direction);
@@ -327,9 +334,8 @@ impl Emitter {
 
     /// Distance, and whether the emitting side was met.
     fn intersect(&self, segment: &Segment) -> Option<(f64, bool)> {
-        let inverse = self.axes.inverse();
-        let origin = inverse * (segment.origin - self.centre);
-        let direction = inverse * segment.direction;
+        let origin = self.inverse * (segment.origin - self.centre);
+        let direction = self.inverse * segment.direction;
         let [half_x, half_y] = self.half();
         match self.shape {
             AreaShape::Quad { .. } | AreaShape::Disk { .. } => {

@@ -61,6 +61,8 @@ pub struct World {
     pub geometry: Geometry,
     pub surfaces: Surfaces,
     pub lights: Lights,
+    /// Whether any material has holes.
+    pub cut_outs: bool,
 }
 
 /// Holes of cut-outs that one ray goes through at most.
@@ -78,7 +80,8 @@ impl World {
         let geometry = Geometry::new(scene);
         let surfaces = Surfaces::new(scene);
         let lights = Lights::new(scene, &geometry, &surfaces);
-        Self { scene: scene.clone(), geometry, surfaces, lights }
+        let cut_outs = scene.materials.iter().any(|material| material.alpha_mode != lobelia_scene::AlphaMode::Opaque);
+        Self { scene: scene.clone(), geometry, surfaces, lights, cut_outs }
     }
 
     fn meet(&self, segment: &Segment) -> Meeting {
@@ -107,11 +110,7 @@ impl World {
             return false;
         }
         // Cut-outs are rare: only where the quick test is stopped are holes looked for.
-        self.geometry.is_free(segment) || (self.has_cut_outs() && matches!(self.meet(segment), Meeting::Nothing | Meeting::Emitter { .. }))
-    }
-
-    fn has_cut_outs(&self) -> bool {
-        self.scene.materials.iter().any(|material| material.alpha_mode != lobelia_scene::AlphaMode::Opaque)
+        self.geometry.is_free(segment) || (self.cut_outs && matches!(self.meet(segment), Meeting::Nothing | Meeting::Emitter { .. }))
     }
 
     /// Radiance that arrives along a ray, one sample of it.
@@ -155,8 +154,12 @@ impl World {
                 radiance += throughput * self.light_at(&surface, to_viewer, sampler);
             }
             let Some(sample) = sample_brdf(&surface.brdf, surface.normal, to_viewer, sampler.pair()) else { break };
-            let f = surface.brdf.evaluate_brdf(surface.normal, surface.geometric_normal, sample.direction, to_viewer);
-            throughput *= f * (surface.normal.dot(sample.direction) / sample.pdf);
+            throughput *= if surface.normal == surface.geometric_normal {
+                sample.weight
+            } else {
+                let f = surface.brdf.evaluate_brdf(surface.normal, surface.geometric_normal, sample.direction, to_viewer);
+                f * (surface.normal.dot(sample.direction) / sample.pdf)
+            };
             if !(throughput.max_element() > 0.0 && throughput.is_finite()) {
                 break;
             }
@@ -171,7 +174,7 @@ impl World {
     fn light_at(&self, surface: &Surface, to_viewer: DVec3, sampler: &mut Sampler) -> DVec3 {
         let mut sum = DVec3::ZERO;
         for light in 0..self.lights.count() {
-            let u = sampler.pair();
+            let u = if self.lights.is_random(light) { sampler.pair() } else { [0.0; 2] };
             let Some(sample) = self.lights.sample(light, &self.scene, &self.geometry, &self.surfaces, surface.position, u) else {
                 continue;
             };

@@ -6,7 +6,9 @@ use lobelia_lobes::sampling::hash;
 pub struct Sampler {
     index: u32,
     seed: u32,
-    pair: u32,
+    set: u32,
+    /// The second half of the last set, if it was not used yet.
+    rest: Option<[f64; 2]>,
 }
 
 /// The generator has 2^16 points; longer runs begin a new scramble.
@@ -16,17 +18,19 @@ impl Sampler {
     /// The numbers of sample `sample` of pixel `pixel`.
     pub fn new(pixel: u32, sample: u64, seed: u32) -> Self {
         let block = (sample / POINTS) as u32;
-        Self { index: (sample % POINTS) as u32, seed: hash(pixel ^ hash(seed ^ hash(block))), pair: 0 }
+        Self { index: (sample % POINTS) as u32, seed: hash(pixel ^ hash(seed ^ hash(block))), set: 0, rest: None }
     }
 
     /// Two numbers in [0, 1).
     pub fn pair(&mut self) -> [f64; 2] {
+        if let Some(rest) = self.rest.take() {
+            return rest;
+        }
         // Sets of four dimensions under seeds of their own: any number of pairs, each well spread in its plane.
-        let (set, half) = (self.pair / 2, self.pair % 2);
-        self.pair += 1;
-        let four = sobol_burley::sample_4d(self.index, 0, hash(self.seed ^ set.wrapping_mul(0x9e37_79b9)));
-        let at = 2 * half as usize;
-        [f64::from(four[at]), f64::from(four[at + 1])]
+        let four = sobol_burley::sample_4d(self.index, 0, hash(self.seed ^ self.set.wrapping_mul(0x9e37_79b9))).map(f64::from);
+        self.set += 1;
+        self.rest = Some([four[2], four[3]]);
+        [four[0], four[1]]
     }
 }
 

@@ -1,7 +1,7 @@
 //! Surfaces as the passes shade them: textures, normal maps, both sides (see the conventions of `lobelia::surface` in WGSL).
 
 use crate::geometry::{Geometry, Hit, Segment};
-use glam::{DMat3, DVec2, DVec3, DVec4, Vec2};
+use glam::{DVec2, DVec3, DVec4, Vec2};
 use lobelia_lobes::{
     brdf::{Brdf, Distribution},
     tonemap::srgb_decode,
@@ -113,12 +113,8 @@ impl Surfaces {
         let mesh = &scene.meshes[instance.mesh];
         let material = &scene.materials[triangle.material];
         let (weights, position) = geometry.locate(hit.triangle, segment);
-        let linear = DMat3::from_mat4(instance.world_from_local);
-        let mirrored = linear.determinant() < 0.0;
-        let first = geometry.first_index[hit.triangle] as usize;
-        // Mirrored instances have two corners exchanged, as in `Scene::triangles`.
-        let order = if mirrored { [0, 2, 1] } else { [0, 1, 2] };
-        let corner = order.map(|place| mesh.indices[first + place] as usize);
+        let (face, frame) = (&geometry.faces[hit.triangle], &geometry.frames[triangle.instance]);
+        let corner = face.vertices.map(|vertex| vertex as usize);
         let uv: DVec2 = corner
             .iter()
             .zip(weights)
@@ -134,15 +130,15 @@ impl Surfaces {
             .map(|(vertex, weight)| mesh.tangents.get(*vertex).copied().unwrap_or_default().as_dvec4() * weight)
             .sum();
         let to_viewer = -segment.direction;
-        let true_normal = geometry.true_normal(hit.triangle);
-        let unturned = (linear.inverse().transpose() * local).normalize_or(to_viewer);
+        let true_normal = face.normal;
+        let unturned = (frame.normal * local).normalize_or(to_viewer);
         let mut shading = unturned;
         if let (Some(_), true) = (material.normal_texture, tangent.w != 0.0 && material.normal_scale != 0.0) {
             let scale = f64::from(material.normal_scale);
             let texel = self.texel(material.normal_texture, uv, false).truncate();
             let t = (texel * 2.0 - 1.0) * DVec3::new(scale, scale, 1.0);
-            let axis = (linear * tangent.truncate()).normalize_or_zero();
-            let handedness = tangent.w.signum() * if mirrored { -1.0 } else { 1.0 };
+            let axis = (frame.linear * tangent.truncate()).normalize_or_zero();
+            let handedness = tangent.w.signum() * if frame.mirrored { -1.0 } else { 1.0 };
             shading = (axis * t.x + unturned.cross(axis) * handedness * t.y + unturned * t.z).normalize_or(unturned);
         }
         let side = if unturned.dot(to_viewer) >= 0.0 { 1.0 } else { -1.0 };
@@ -180,11 +176,8 @@ impl Surfaces {
     }
 
     fn uv(&self, scene: &Scene, geometry: &Geometry, triangle: usize, weights: [f64; 3]) -> DVec2 {
-        let instance = &scene.instances[geometry.triangles[triangle].instance];
-        let mesh = &scene.meshes[instance.mesh];
-        let first = geometry.first_index[triangle] as usize;
-        let order = if instance.world_from_local.determinant() < 0.0 { [0, 2, 1] } else { [0, 1, 2] };
-        let at = |place: usize| mesh.uvs.get(mesh.indices[first + place] as usize).copied().unwrap_or(Vec2::ZERO).as_dvec2();
-        order.iter().zip(weights).map(|(place, weight)| at(*place) * weight).sum()
+        let mesh = &scene.meshes[scene.instances[geometry.triangles[triangle].instance].mesh];
+        let at = |vertex: u32| mesh.uvs.get(vertex as usize).copied().unwrap_or(Vec2::ZERO).as_dvec2();
+        geometry.faces[triangle].vertices.iter().zip(weights).map(|(vertex, weight)| at(*vertex) * weight).sum()
     }
 }

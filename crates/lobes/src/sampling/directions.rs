@@ -247,10 +247,11 @@ pub fn brdf_pdf(brdf: &Brdf, n: DVec3, v: DVec3, l: DVec3) -> f64 {
     if n_dot_l <= 0.0 || n_dot_v <= 0.0 {
         return 0.0;
     }
+    let probability = specular_probability(brdf, n_dot_v);
     let specular = match brdf.distribution {
+        _ if probability == 0.0 => 0.0,
         Distribution::Ggx => ggx_reflection_pdf(brdf.alpha, n, v, l),
         Distribution::Phong => phong_reflection_pdf(brdf.alpha, n, v, l),
     };
-    let probability = specular_probability(brdf, n_dot_v);
     (1.0 - probability) * n_dot_l / PI + probability * specular
 }
