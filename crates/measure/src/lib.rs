@@ -1,16 +1,25 @@
 //! Measuring pictures. A metric is named for exactly what it computes.
 //!
 //! [`compare`] gives every metric of a reference and a test image at once, where a [`Mask`] counts; [`relative_mse`], [`relative_mse_with_epsilon`]
-//! and [`rmse`] give one over all pixels. All sums are 64-bit floats. [`read_exr`], [`write_exr`] and [`write_png`] move pictures in and out.
+//! and [`rmse`] give one over all pixels. [`measure`] gives everything that a report shows: those, and MAE, PSNR, SSIM, FLIP and fireflies. [`bias_variance`] and
+//! [`temporal_error`] take several pictures of one setting. All sums are 64-bit floats. [`read_exr`], [`write_exr`] and [`write_png`] move pictures in and out.
 
+pub mod flip;
 mod image_file;
 mod mask;
 mod metric;
+mod metrics;
+mod sequence;
+mod ssim;
 pub mod timing;
 
+pub use flip::{flip_hdr, flip_ldr};
 pub use image_file::{Precision, WriteSeek, read_exr, replace_file, write_exr, write_exr_with, write_png};
 pub use mask::Mask;
 pub use metric::{Statistics, compare, mean, relative_mse, relative_mse_with_epsilon, rmse};
+pub use metrics::{Metrics, display, false_colour, measure, relative_error_map};
+pub use sequence::{BiasVariance, bias_variance, temporal_error};
+pub use ssim::ssim;
 
 /// Linear RGB, row 0 at the top.
 #[derive(Clone, Debug, PartialEq)]
@@ -79,6 +88,12 @@ pub enum MeasureError {
     /// A floor below 0 or without a finite value.
     #[error("epsilon is {0}; it must be finite and not below 0")]
     Epsilon(f64),
+    /// A viewing distance that no display has.
+    #[error("{0} pixels per degree; it must lie in [1, 2000]")]
+    PixelsPerDegree(f64),
+    /// A sequence too short, or of unequal lengths.
+    #[error("{0}")]
+    Sequence(String),
     /// A file.
     #[error("{file}: {reason}")]
     File {

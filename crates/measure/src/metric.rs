@@ -22,6 +22,18 @@ fn check(image: &Image, which: &'static str) -> Result<(), MeasureError> {
     }
 }
 
+/// Two finite pictures of one size.
+pub(crate) fn check_pair(reference: &Image, test: &Image) -> Result<(), MeasureError> {
+    check(reference, "reference")?;
+    check(test, "test image")?;
+    if (reference.width, reference.height) == (test.width, test.height) {
+        return Ok(());
+    }
+    let what =
+        format!("the reference has {} x {} pixels, the test image {} x {}", reference.width, reference.height, test.width, test.height);
+    Err(MeasureError::Size(what))
+}
+
 /// Mean of each channel; 0 without pixels.
 pub fn mean(image: &Image) -> [f64; 3] {
     let mut total = [0.0; 3];

@@ -1,7 +1,11 @@
 //! Against values that another program computed: the pairs of `reference/metrics/metrics.json`, one of them copied here.
 #![allow(clippy::unwrap_used)]
 
-use lobelia_measure::{Image, mean, read_exr, relative_mse, relative_mse_with_epsilon, rmse};
+use lobelia_measure::{
+    Image,
+    flip::{Exposures, PIXELS_PER_DEGREE, flip_hdr, flip_ldr},
+    mean, read_exr, relative_mse, relative_mse_with_epsilon, rmse,
+};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -95,4 +99,43 @@ fn images_have_the_means_that_their_renderer_stated() {
         }
     }
     assert!(images >= 9, "{images}");
+}
+
+#[test]
+fn flip_of_a_pair_measured_elsewhere() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
+    let [reference, test] = ["reference", "test"].map(|part| read(&data.join(format!("cornell-glossy-main_ldr_{part}.png"))));
+    let found = flip_ldr(&reference, &test, PIXELS_PER_DEGREE).unwrap();
+    assert!((found.mean - 0.37509721517562866).abs() < 1e-5, "{}", found.mean);
+    // Seen from half the distance it is another number.
+    assert!((flip_ldr(&reference, &test, 0.5 * PIXELS_PER_DEGREE).unwrap().mean - found.mean).abs() > 1e-3);
+}
+
+/// FLIP of every pair, HDR with its exposures, and every pixel of its maps.
+#[test]
+fn flip_maps_measured_elsewhere() {
+    let Some(folder) = reference() else { return };
+    let list: Value = serde_json::from_slice(&std::fs::read(folder.join("metrics/metrics.json")).unwrap()).unwrap();
+    for vector in list["vectors"].as_array().unwrap() {
+        let [reference, test] = ["reference", "test"].map(|part| read(&folder.join(vector[part].as_str().unwrap())));
+        let parameters = &vector["parameters"];
+        let found = if vector["kind"] == "HDR" {
+            let exposures = Exposures::of(&reference);
+            assert!((exposures.start - parameters["startExposure"].as_f64().unwrap()).abs() < 1e-4, "{exposures:?}");
+            assert!((exposures.stop - parameters["stopExposure"].as_f64().unwrap()).abs() < 1e-3, "{exposures:?}");
+            assert_eq!(exposures.count as u64, parameters["numExposures"].as_u64().unwrap());
+            flip_hdr(&reference, &test, PIXELS_PER_DEGREE).unwrap()
+        } else {
+            flip_ldr(&reference, &test, PIXELS_PER_DEGREE).unwrap()
+        };
+        let expected = vector["flip_mean"].as_f64().unwrap();
+        let map = exr::prelude::read_all_flat_layers_from_file(folder.join(vector["map"].as_str().unwrap())).unwrap();
+        let values: Vec<f32> = map.layer_data[0].channel_data.list[0].sample_data.values_as_f32().collect();
+        let worst = values.iter().zip(&found.map).map(|(want, got)| (want - got).abs()).fold(0.0, f32::max);
+        println!(
+            "{} {}: mean {} against {expected}, largest difference of a pixel {worst:.1e}",
+            vector["kind"], vector["reference"], found.mean
+        );
+        assert!((found.mean - expected).abs() < 1e-5 && worst < 1e-4, "{vector}: {} {worst}", found.mean);
+    }
 }

@@ -8,8 +8,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use lobelia::{
     Session, Shot,
     graph::{Override, Timing},
-    lobes,
-    measure::{Image, read_exr, timing::Ratio},
+    measure::{self, Image, read_exr, timing::Ratio},
     reference::Settings,
     report::{Comparison, PassCost, PassDifference, Picture, Variant, comparison_page},
     trial::{self, Measured, Technique, TrialOptions},
@@ -239,36 +238,28 @@ pub fn show_trial(bar: &ProgressBar, step: &trial::TrialStep<'_>, shot: &Shot) -
 
 /// Metrics by name, for tables and files.
 pub fn metrics(image: &Image, reference: &Image) -> Result<BTreeMap<String, f64>, Failure> {
-    let fail = |error: lobelia::measure::MeasureError| Failure::Run(error.to_string());
-    let mut found = BTreeMap::new();
-    found.insert("relative_mse".to_owned(), lobelia::measure::relative_mse(reference, image).map_err(fail)?);
-    found.insert("rmse".to_owned(), lobelia::measure::rmse(reference, image).map_err(fail)?);
-    Ok(found)
+    let found = measure::measure(reference, image).map_err(measured_wrong)?;
+    let value = serde_json::to_value(found).map_err(|error| Failure::Run(error.to_string()))?;
+    let numbers = value.as_object().into_iter().flatten().map(|(name, value)| {
+        // JSON has no infinity: the PSNR of equal pictures.
+        (name.clone(), value.as_f64().unwrap_or(f64::INFINITY))
+    });
+    Ok(numbers.collect())
 }
 
-/// Shows linear radiance as every picture of a report is shown: one exposure, the ACES curve, sRGB.
-pub struct Display {
-    exposure: f64,
+fn measured_wrong(error: measure::MeasureError) -> Failure {
+    Failure::Run(error.to_string())
 }
 
-impl Display {
-    /// Puts the mean luminance of the reference at middle grey.
-    pub fn for_reference(reference: &Image) -> Self {
-        let luminance = |pixel: &[f32; 3]| lobes::luminance(glam::DVec3::from(pixel.map(f64::from)));
-        let mean =
-            reference.pixels.iter().map(luminance).filter(|value| value.is_finite()).sum::<f64>() / reference.pixels.len().max(1) as f64;
-        Self { exposure: if mean > 0.0 { 0.18 / mean } else { 1.0 } }
-    }
-
-    /// An encoded PNG.
-    pub fn picture(&self, image: &Image) -> Result<Picture, Failure> {
-        let shown = |pixel: &[f32; 3]| {
-            let color = glam::DVec3::from(pixel.map(f64::from)) * self.exposure;
-            lobes::tonemap::aces(color).to_array().map(|value| (lobes::tonemap::srgb_encode(value.clamp(0.0, 1.0)) * 255.0).round() as u8)
-        };
-        let bytes: Vec<u8> = image.pixels.iter().flat_map(shown).collect();
-        encode(image.width, image.height, &bytes)
-    }
+/// A picture as every picture of a report is displayed: at one exposure, chosen from the reference.
+fn displayed(reference: &Image, image: &Image) -> Result<Picture, Failure> {
+    let bytes: Vec<u8> = measure::display(reference, image)
+        .pixels
+        .as_flattened()
+        .iter()
+        .map(|value| (value.clamp(0.0, 1.0) * 255.0).round() as u8)
+        .collect();
+    encode(image.width, image.height, &bytes)
 }
 
 fn encode(width: usize, height: usize, rgb: &[u8]) -> Result<Picture, Failure> {
@@ -279,19 +270,9 @@ fn encode(width: usize, height: usize, rgb: &[u8]) -> Result<Picture, Failure> {
     Ok(Picture { width: width as u32, height: height as u32, png })
 }
 
-/// Error maps of the report: how far each pixel is off relative to the reference.
-fn error_picture(image: &Image, reference: &Image) -> Result<Picture, Failure> {
-    let mean = reference.pixels.as_flattened().iter().map(|value| f64::from(*value)).sum::<f64>() / (3 * reference.pixels.len()) as f64;
-    let colour = |(test, truth): (&[f32; 3], &[f32; 3])| {
-        let off =
-            test.iter().zip(truth).map(|(left, right)| f64::from(left - right).abs() / (f64::from(*right) + 0.1 * mean)).sum::<f64>() / 3.0;
-        // From 0.1 % (black) to 100 % (bright).
-        let share = if off.is_nan() { 1.0 } else { ((off.max(1e-9)).log10() + 3.0) / 3.0 };
-        let colour = colorous::INFERNO.eval_continuous(share.clamp(0.0, 1.0));
-        [colour.r, colour.g, colour.b]
-    };
-    let bytes: Vec<u8> = image.pixels.iter().zip(&reference.pixels).flat_map(colour).collect();
-    encode(image.width, image.height, &bytes)
+/// A map in colours, from `low` (black) to `high`.
+fn map_picture(image: &Image, map: &[f32], low: f32, high: f32) -> Result<Picture, Failure> {
+    encode(image.width, image.height, measure::false_colour(map, low, high).as_flattened())
 }
 
 const MEBIBYTE: f64 = (1u64 << 20) as f64;
@@ -299,11 +280,10 @@ const MEBIBYTE: f64 = (1u64 << 20) as f64;
 fn write(arguments: &Arguments, scene: &lobelia::scene::Scene, known: &Known, measured: &[Measured]) -> Result<(), Failure> {
     let folder = &arguments.report;
     files::write_exr(&folder.join("reference.exr"), &known.image)?;
-    let display = Display::for_reference(&known.image);
     let mut variants = Vec::new();
     for one in measured {
         files::write_exr(&folder.join(format!("{}.exr", file_name(&one.name))), &one.image)?;
-        variants.push(variant(one, &measured[0], known, &display)?);
+        variants.push(variant(one, &measured[0], known)?);
     }
     let differences = measured[1..].iter().flat_map(|other| {
         trial::differences(&measured[0], other).into_iter().map(|difference| PassDifference {
@@ -319,7 +299,7 @@ fn write(arguments: &Arguments, scene: &lobelia::scene::Scene, known: &Known, me
         device: measured[0].device.clone(),
         scene: facts(arguments, scene, known, measured),
         command: std::iter::once("lobelia".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" "),
-        reference: display.picture(&known.image)?,
+        reference: displayed(&known.image, &known.image)?,
         differences: differences.collect(),
         variants,
     };
@@ -344,7 +324,7 @@ fn file_name(name: &str) -> String {
     name.chars().map(|letter| if letter.is_ascii_alphanumeric() || "-_+.".contains(letter) { letter } else { '_' }).collect()
 }
 
-fn variant(one: &Measured, first: &Measured, known: &Known, display: &Display) -> Result<Variant, Failure> {
+fn variant(one: &Measured, first: &Measured, known: &Known) -> Result<Variant, Failure> {
     let mut settings = vec![("compared".to_owned(), one.output.clone())];
     settings.extend(
         one.passes.iter().filter(|pass| pass.params != "()").map(|pass| (format!("{} ({})", pass.name, pass.kind), pass.params.clone())),
@@ -366,13 +346,15 @@ fn variant(one: &Measured, first: &Measured, known: &Known, display: &Display) -
             cpu_ms: pass.cpu_ms.map_or(f64::NAN, |summary| summary.median),
         }
     });
+    let relative = measure::relative_error_map(&known.image, &one.image).map_err(measured_wrong)?;
+    let flip = measure::flip_hdr(&known.image, &one.image, measure::flip::PIXELS_PER_DEGREE).map_err(measured_wrong)?;
     Ok(Variant {
         name: one.name.clone(),
         settings,
         metrics: metrics(&one.image, &known.image)?,
-        picture: display.picture(&one.image)?,
-        error: error_picture(&one.image, &known.image)?,
-        flip: None,
+        picture: displayed(&known.image, &one.image)?,
+        error: map_picture(&one.image, &relative, 1e-3, 1.0)?,
+        flip: Some(map_picture(&one.image, &flip.map, 0.0, 1.0)?),
         passes: passes.collect(),
         pruned: one.dropped.clone(),
         total_ms: one.frame_ms.map_or(f64::NAN, |summary| summary.median),
@@ -410,6 +392,7 @@ fn facts(arguments: &Arguments, scene: &lobelia::scene::Scene, known: &Known, me
         ),
         ("distribution of normals", scene.ndf.to_string()),
         ("reference", known.note.clone()),
+        ("maps", "relative error from 0.1 % (black) to 100 % (yellow), logarithmic; FLIP (HDR) from 0 to 1".to_owned()),
         ("times", format!("{how}; {} rounds in turn, the first not counted", arguments.shot.rounds)),
     ]
     .map(|(name, value)| (name.to_owned(), value))
