@@ -253,12 +253,19 @@ pub struct Row {
     pub ms: Option<f64>,
     /// Mebibytes of all resources.
     pub mebibytes: Option<f64>,
-    /// Metrics by name.
+    /// Metrics by name. What has no finite value is null in the file.
+    #[serde(deserialize_with = "null_as_infinity")]
     pub metrics: BTreeMap<String, f64>,
     /// Median milliseconds of each pass.
     pub passes: Vec<(String, Option<f64>)>,
     /// Why the run failed, if it did.
     pub failed: Option<String>,
+}
+
+/// JSON has no infinity.
+fn null_as_infinity<'a, D: serde::Deserializer<'a>>(from: D) -> Result<BTreeMap<String, f64>, D::Error> {
+    let values = BTreeMap::<String, Option<f64>>::deserialize(from)?;
+    Ok(values.into_iter().map(|(name, value)| (name, value.unwrap_or(f64::INFINITY))).collect())
 }
 
 impl Row {
@@ -556,7 +563,11 @@ mod tests {
     fn rows_survive_a_kill_and_shards_merge() {
         let sweep = Sweep::parse(TEXT, "s.ron").unwrap();
         let root = tempfile::tempdir().unwrap();
-        let row = |cell: &Cell| Row { ms: Some(cell.index as f64), metrics: [("relative_mse".to_owned(), 0.1)].into(), ..Row::new(cell) };
+        let row = |cell: &Cell| Row {
+            ms: Some(cell.index as f64),
+            metrics: [("relative_mse".to_owned(), 0.1), ("psnr".to_owned(), f64::INFINITY)].into(),
+            ..Row::new(cell)
+        };
         let folders: Vec<PathBuf> = (1..=2).map(|index| root.path().join(format!("shard{index}"))).collect();
         for (index, folder) in folders.iter().enumerate() {
             let mut store = Store::open(folder, &sweep).unwrap();

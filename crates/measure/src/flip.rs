@@ -86,7 +86,9 @@ impl Exposures {
         // Where the curve reaches 0.85.
         let [a, b, c] = [0, 1, 2].map(|power| ACES[power] - 0.85 * ACES[power + 3]);
         let bright = (-b + (b * b - 4.0 * a * c).sqrt()) / (2.0 * a);
-        let (start, stop) = ((bright / largest).log2(), (bright / median.max(f64::from(f32::EPSILON))).log2());
+        // A median of 0 has no exposure; nor may the floor lie above the largest of a dim picture.
+        let floor = f64::from(f32::EPSILON) * largest.min(1.0);
+        let (start, stop) = ((bright / largest).log2(), (bright / median.max(floor)).log2());
         Self { start, stop, count: ((stop - start).ceil() as usize).clamp(2, 1000) }
     }
 
@@ -344,6 +346,17 @@ mod tests {
         let black = flat([0.0; 3]);
         assert_eq!(flip_hdr(&black, &black, PIXELS_PER_DEGREE).unwrap().mean, 0.0);
         assert!(flip_hdr(&black, &flat([1.0; 3]), PIXELS_PER_DEGREE).unwrap().mean > 0.5);
+        // How dim both are does not matter.
+        let dim = |scale: f32, factor: f32| Image {
+            pixels: reference.pixels.iter().map(|p| p.map(|v| v * factor * scale)).collect(),
+            ..reference.clone()
+        };
+        for scale in [1e-6, 1e-10, 1e-14] {
+            let exposures = Exposures::of(&dim(scale, 1.0));
+            assert!(exposures.start < exposures.stop && exposures.count == Exposures::of(&reference).count, "{scale}: {exposures:?}");
+            let found = flip_hdr(&dim(scale, 1.0), &dim(scale, 1.5), PIXELS_PER_DEGREE).unwrap().mean;
+            assert!((found - off.mean).abs() < 1e-5, "{scale}: {found} {}", off.mean);
+        }
         let huge = flat([f32::MAX; 3]);
         assert!(flip_hdr(&flat([1.0; 3]), &huge, PIXELS_PER_DEGREE).unwrap().mean.is_finite());
     }

@@ -12,13 +12,15 @@ use serde::{Deserialize, Serialize};
 /// Metrics by name. Radiance is compared as it is; PSNR, SSIM and LDR-FLIP see both pictures as [`display`] shows them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Metrics {
-    /// `mean of (test - reference)^2 / (reference^2 + (0.1 m)^2)`, m the mean of the reference. Lower is better.
+    /// `mean of (test - reference)^2 / (reference^2 + (0.1 m)^2)`, m the mean of the reference. Lower is better; infinite against a black reference.
+    #[serde(with = "unbounded")]
     pub relative_mse: f64,
     /// Root of the mean squared difference, in radiance. Lower is better.
     pub rmse: f64,
     /// Mean absolute difference, in radiance. Lower is better.
     pub mae: f64,
     /// `-10 log10` of the mean squared difference of displayed values, whose peak is 1, dB. Higher is better; infinite for equal pictures.
+    #[serde(with = "unbounded")]
     pub psnr: f64,
     /// Structural similarity of displayed luma. Higher is better, at most 1.
     pub ssim: f64,
@@ -26,10 +28,25 @@ pub struct Metrics {
     pub flip_ldr: f64,
     /// FLIP over the exposures of the reference. Lower is better, in [0, 1].
     pub flip_hdr: f64,
-    /// Pixels in a million that are ten times as bright as the reference and as all but two of their eight neighbours. Lower is better.
+    /// Pixels in a million that are ten times as bright as the reference is there and next to it, and as all but two of their eight neighbours.
+    /// Lower is better.
     pub fireflies: f64,
-    /// Mean of the test image over that of the reference; 1 is right.
+    /// Mean of the test image over that of the reference; 1 is right. Infinite where the reference's is 0.
+    #[serde(with = "unbounded")]
     pub mean_ratio: f64,
+}
+
+/// JSON has no infinity: it is written as nothing, and nothing is read as infinity. The sign of an infinite ratio is lost.
+mod unbounded {
+    use serde::{Deserialize as _, Deserializer, Serialize as _, Serializer};
+
+    pub fn serialize<S: Serializer>(value: &f64, to: S) -> Result<S::Ok, S::Error> {
+        value.is_finite().then_some(*value).serialize(to)
+    }
+
+    pub fn deserialize<'a, D: Deserializer<'a>>(from: D) -> Result<f64, D::Error> {
+        Ok(Option::<f64>::deserialize(from)?.unwrap_or(f64::INFINITY))
+    }
 }
 
 /// Radiance as it is displayed: so exposed that the mean luminance of the reference is middle grey (0.18), under a fit of the ACES curve, sRGB-encoded.
@@ -50,7 +67,7 @@ pub fn measure(reference: &Image, test: &Image) -> Result<Metrics, MeasureError>
     let basic = compare(reference, test, &Mask::all(reference))?;
     let [shown_reference, shown_test] = [reference, test].map(|image| display(reference, image));
     let pairs = |a: &Image, b: &Image| -> Vec<f64> {
-        a.pixels.as_flattened().iter().zip(b.pixels.as_flattened()).map(|(left, right)| f64::from(left - right)).collect()
+        a.pixels.as_flattened().iter().zip(b.pixels.as_flattened()).map(|(left, right)| f64::from(*left) - f64::from(*right)).collect()
     };
     let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / (3 * reference.pixels.len()) as f64;
     let squared = mean(&mut pairs(&shown_reference, &shown_test).into_iter().map(|difference| difference * difference));
@@ -67,11 +84,11 @@ pub fn measure(reference: &Image, test: &Image) -> Result<Metrics, MeasureError>
     })
 }
 
-/// Pixels that are ten times as bright as the reference there and as all but two of their neighbours, and above a tenth of the reference's mean.
+/// Pixels that are ten times as bright as the reference there and next to it, and as all but two of their neighbours, and above a tenth of the reference's mean.
 fn fireflies(reference: &Image, test: &Image) -> usize {
-    const FACTOR: f32 = 10.0;
-    let brightness = |image: &Image, index: usize| image.pixels[index].iter().sum::<f32>();
-    let floor = 0.1 * (0..reference.pixels.len()).map(|index| brightness(reference, index)).sum::<f32>() / reference.pixels.len() as f32;
+    const FACTOR: f64 = 10.0;
+    let brightness = |image: &Image, index: usize| image.pixels[index].iter().map(|value| f64::from(*value)).sum::<f64>();
+    let floor = 0.1 * (0..reference.pixels.len()).map(|index| brightness(reference, index)).sum::<f64>() / reference.pixels.len() as f64;
     let (width, height) = (test.width as i64, test.height as i64);
     let is_one = |index: &usize| {
         let value = brightness(test, *index);
@@ -79,12 +96,17 @@ fn fireflies(reference: &Image, test: &Image) -> usize {
             return false;
         }
         let (x, y) = (*index as i64 % width, *index as i64 / width);
-        let near = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (x + dx, y + dy)));
-        let mut near: Vec<f32> = near
+        let near: Vec<usize> = (-1..=1)
+            .flat_map(|dy| (-1..=1).map(move |dx| (x + dx, y + dy)))
             .filter(|(u, v)| (*u, *v) != (x, y) && (0..width).contains(u) && (0..height).contains(v))
-            .map(|(u, v)| brightness(test, (v * width + u) as usize))
+            .map(|(u, v)| (v * width + u) as usize)
             .collect();
-        near.sort_by(f32::total_cmp);
+        // A bright edge that lies a pixel elsewhere is no firefly.
+        if near.iter().any(|place| value <= FACTOR * brightness(reference, *place)) {
+            return false;
+        }
+        let mut near: Vec<f64> = near.into_iter().map(|place| brightness(test, place)).collect();
+        near.sort_by(f64::total_cmp);
         // Two neighbours may be as bright: fireflies come in pairs.
         near.len().checked_sub(3).is_none_or(|third| value > FACTOR * near[third])
     };
@@ -97,7 +119,7 @@ pub fn relative_error_map(reference: &Image, test: &Image) -> Result<Vec<f32>, M
     let mean = reference.pixels.as_flattened().iter().map(|value| f64::from(*value)).sum::<f64>() / (3 * reference.pixels.len()) as f64;
     let off = |(expected, found): (&[f32; 3], &[f32; 3])| {
         let parts = expected.iter().zip(found).map(|(r, t)| {
-            let difference = f64::from(t - r).abs();
+            let difference = (f64::from(*t) - f64::from(*r)).abs();
             if difference == 0.0 { 0.0 } else { difference / (f64::from(*r).abs() + 0.1 * mean.abs()) }
         });
         (parts.sum::<f64>() / 3.0) as f32
@@ -106,10 +128,14 @@ pub fn relative_error_map(reference: &Image, test: &Image) -> Result<Vec<f32>, M
 }
 
 /// Colours for a map: black at `low` and below, bright yellow at `high` and above, on a logarithmic scale if `low` is above 0, else a linear one.
+/// NaN is shown as what is above. Without a range (`high` not above `low`, or not finite) what is above `low` is bright and all else black.
 pub fn false_colour(map: &[f32], low: f32, high: f32) -> Vec<[u8; 3]> {
     let share = |value: f32| {
-        if value.is_nan() {
+        let range = high > low && low.is_finite() && high.is_finite();
+        if value.is_nan() || (!range && value > low) {
             1.0
+        } else if !range {
+            0.0
         } else if low > 0.0 {
             (value.max(low) / low).ln() / (high / low).ln()
         } else {
@@ -167,6 +193,44 @@ mod tests {
     }
 
     #[test]
+    fn a_bright_line_elsewhere_is_no_row_of_fireflies() {
+        let line = |at: usize| {
+            let value = |index: usize| if index % 32 == at { 20.0 } else { 0.2 };
+            Image { width: 32, height: 32, pixels: (0..1024).map(|index| [value(index); 3]).collect() }
+        };
+        assert_eq!(measure(&line(15), &line(16)).unwrap().fireflies, 0.0);
+        // Where the reference has no line at all, each pixel has two bright neighbours and counts.
+        assert_eq!(measure(&Image { pixels: vec![[0.2; 3]; 1024], ..line(0) }, &line(16)).unwrap().fireflies, 31250.0);
+    }
+
+    /// What JSON has no number for comes back, too.
+    #[test]
+    fn metrics_come_back_from_json() {
+        for (reference, test) in [(0.4, 0.4), (0.0, 1.0), (0.4, 0.5)] {
+            let metrics = measure(&flat(reference), &flat(test)).unwrap();
+            let text = serde_json::to_string(&metrics).unwrap();
+            let back: Metrics = serde_json::from_str(&text).unwrap();
+            let numbers = |of: &Metrics| [of.relative_mse, of.psnr, of.mean_ratio, of.mae, of.flip_hdr];
+            for (found, expected) in numbers(&back).into_iter().zip(numbers(&metrics)) {
+                // Reading decimal digits may round the last bit.
+                assert!(found == expected || (found / expected - 1.0).abs() < 1e-15, "{found} {expected} {text}");
+            }
+        }
+        assert!(serde_json::from_str::<Metrics>("{\"psnr\":null}").is_err(), "what is missing is not infinite");
+    }
+
+    /// Differences of the largest floats do not fit a float.
+    #[test]
+    fn the_largest_floats_have_finite_metrics() {
+        let mut ends = [flat(0.0), flat(0.0)];
+        (ends[0].pixels[7], ends[1].pixels[7]) = ([f32::MAX; 3], [-f32::MAX; 3]);
+        let found = measure(&ends[0], &ends[1]).unwrap();
+        assert!((found.mae / (2.0 * f64::from(f32::MAX) / 192.0) - 1.0).abs() < 1e-6, "{found:?}");
+        let map = relative_error_map(&ends[0], &ends[1]).unwrap();
+        assert!((map[7] - 2.0).abs() < 2e-3, "{}", map[7]);
+    }
+
+    #[test]
     fn a_black_reference_and_broken_pictures() {
         let black = measure(&flat(0.0), &flat(1.0)).unwrap();
         assert!(black.relative_mse.is_infinite() && black.flip_hdr > 0.5);
@@ -186,5 +250,9 @@ mod tests {
         assert_eq!((colours[0], colours[2], colours[2]), (colours[1], colours[3], colours[4]));
         assert_ne!(colours[0], colours[2]);
         assert_ne!(false_colour(&[0.5], 0.0, 1.0), false_colour(&[0.6], 0.0, 1.0));
+        for (low, high) in [(0.5, 0.5), (0.5, 0.1), (0.5, f32::NAN), (0.5, f32::INFINITY)] {
+            let colours = false_colour(&[0.4, 0.5, 0.6, f32::INFINITY], low, high);
+            assert_eq!(colours, false_colour(&[0.0, 0.0, 1.0, 1.0], 0.0, 1.0), "{low} to {high}");
+        }
     }
 }

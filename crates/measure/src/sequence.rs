@@ -2,10 +2,11 @@
 
 use crate::{Image, MeasureError, metric::check_pair};
 
-/// An error taken apart: their sum is the mean squared error.
+/// An error taken apart: the sum of both numbers is the mean squared error of one picture, exactly.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BiasVariance {
-    /// Mean over pixels and channels of the squared difference between the mean picture and the reference, what noise alone would make of it taken away; not below 0.
+    /// Mean over pixels and channels of the squared difference between the mean picture and the reference, what noise alone would make
+    /// of it taken away. Right on average, so that it may lie below 0 where there is no bias.
     pub bias_squared: f64,
     /// Mean over pixels and channels of the variance over the pictures.
     pub variance: f64,
@@ -36,7 +37,7 @@ pub fn bias_variance(reference: &Image, tests: &[Image]) -> Result<BiasVariance,
         }));
     }
     let values = (3 * reference.pixels.len()) as f64;
-    Ok(BiasVariance { bias_squared: (squared / values).max(0.0), variance: variance / values, bias })
+    Ok(BiasVariance { bias_squared: squared / values, variance: variance / values, bias })
 }
 
 /// Flicker: the mean over frames, pixels and channels of `|(I_t - I_{t-1}) - (R_t - R_{t-1})|` over the mean of the reference sequence. What changes as the reference
@@ -94,6 +95,9 @@ mod tests {
         let noisy: Vec<Image> = (0..1000u32).map(|index| image(&[1.0 + if index % 2 == 0 { 0.3 } else { -0.3 }, 2.0])).collect();
         let found = bias_variance(&reference, &noisy).unwrap();
         assert!(found.bias_squared < 1e-9 && (found.variance - 0.045).abs() < 1e-3, "{found:?}");
+        // The sum is the mean squared error of one picture, also where the estimate of the bias is below 0.
+        let found = bias_variance(&reference, &noisy[..2]).unwrap();
+        assert!((found.bias_squared + 0.045).abs() < 1e-6 && (found.bias_squared + found.variance - 0.045).abs() < 1e-6, "{found:?}");
         assert!(bias_variance(&reference, &noisy[..1]).is_err() && bias_variance(&image(&[1.0]), &noisy).is_err());
     }
 

@@ -68,11 +68,12 @@ pub struct World {
 /// Holes of cut-outs that one ray goes through at most.
 const HOLES: usize = 256;
 
-/// What a ray meets first.
+/// What a ray meets first. Surfaces are by far the most frequent, and a box for each would cost more than moving it.
+#[allow(clippy::large_enum_variant)]
 enum Meeting {
     Nothing,
     Emitter { radiance: DVec3, pdf: f64 },
-    Surface { surface: Box<Surface>, distance: f64, triangle: usize },
+    Surface { surface: Surface, distance: f64, triangle: usize },
 }
 
 impl World {
@@ -91,7 +92,7 @@ impl World {
         for _ in 0..HOLES {
             let Some(hit) = self.geometry.nearest(&rest) else { break };
             if let Some(surface) = self.surfaces.at(&self.scene, &self.geometry, &rest, &hit) {
-                return Meeting::Surface { surface: Box::new(surface), distance: passed + hit.distance, triangle: hit.triangle };
+                return Meeting::Surface { surface, distance: passed + hit.distance, triangle: hit.triangle };
             }
             // A hole: go on behind it.
             let step = hit.distance + 4e-6 * (rest.origin.abs().max_element() + hit.distance + 0.1);
@@ -139,7 +140,7 @@ impl World {
                     }
                     break;
                 }
-                Meeting::Surface { surface, distance, triangle } => (*surface, distance, triangle),
+                Meeting::Surface { surface, distance, triangle } => (surface, distance, triangle),
             };
             if paths.include(scattered) && surface.emitted != DVec3::ZERO {
                 let cosine = -surface.true_normal.dot(segment.direction);
