@@ -407,7 +407,7 @@ impl Store {
                 return Err(SweepError::Content { file: folder.display().to_string(), what });
             }
         } else {
-            std::fs::write(&copy, &text).map_err(fail(&copy))?;
+            write_whole(&copy, &text).map_err(fail(&copy))?;
         }
         let mut store = Self { folder: folder.into(), rows: Vec::new() };
         let file = store.file();
@@ -416,7 +416,7 @@ impl Store {
             let whole = &text[..text.rfind('\n').map_or(0, |end| end + 1)];
             store.rows = parse_rows(whole, &file)?.into_iter().map(|(row, _)| row).collect();
             if whole.len() < text.len() {
-                std::fs::write(&file, whole).map_err(fail(&file))?;
+                write_whole(&file, whole).map_err(fail(&file))?;
             }
         }
         Ok(store)
@@ -448,6 +448,15 @@ impl Store {
         self.rows.push(row);
         Ok(())
     }
+}
+
+/// Writes a file so that it is whole or as it was.
+fn write_whole(file: &Path, text: &str) -> std::io::Result<()> {
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut part = tempfile::NamedTempFile::new_in(folder)?;
+    part.write_all(text.as_bytes())?;
+    part.persist(file)?;
+    Ok(())
 }
 
 fn parse_rows<'a>(text: &'a str, file: &Path) -> Result<Vec<(Row, &'a str)>, SweepError> {
