@@ -194,6 +194,9 @@ pub enum SweepError {
         /// Why.
         source: std::io::Error,
     },
+    /// A file cannot be written.
+    #[error(transparent)]
+    Write(#[from] lobelia_measure::MeasureError),
 }
 
 /// One run of a sweep.
@@ -407,7 +410,7 @@ impl Store {
                 return Err(SweepError::Content { file: folder.display().to_string(), what });
             }
         } else {
-            write_whole(&copy, &text).map_err(fail(&copy))?;
+            write_whole(&copy, &text)?;
         }
         let mut store = Self { folder: folder.into(), rows: Vec::new() };
         let file = store.file();
@@ -416,7 +419,7 @@ impl Store {
             let whole = &text[..text.rfind('\n').map_or(0, |end| end + 1)];
             store.rows = parse_rows(whole, &file)?.into_iter().map(|(row, _)| row).collect();
             if whole.len() < text.len() {
-                write_whole(&file, whole).map_err(fail(&file))?;
+                write_whole(&file, whole)?;
             }
         }
         Ok(store)
@@ -451,12 +454,8 @@ impl Store {
 }
 
 /// Writes a file so that it is whole or as it was.
-fn write_whole(file: &Path, text: &str) -> std::io::Result<()> {
-    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut part = tempfile::NamedTempFile::new_in(folder)?;
-    part.write_all(text.as_bytes())?;
-    part.persist(file)?;
-    Ok(())
+fn write_whole(file: &Path, text: &str) -> Result<(), SweepError> {
+    Ok(lobelia_measure::replace_file(file, |out| out.write_all(text.as_bytes()).map_err(|error| error.to_string()))?)
 }
 
 fn parse_rows<'a>(text: &'a str, file: &Path) -> Result<Vec<(Row, &'a str)>, SweepError> {

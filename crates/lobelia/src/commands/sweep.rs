@@ -73,7 +73,7 @@ pub struct Arguments {
 impl From<SweepError> for Failure {
     fn from(error: SweepError) -> Self {
         match error {
-            SweepError::File { .. } => Failure::Run(error.to_string()),
+            SweepError::File { .. } | SweepError::Write(_) => Failure::Run(error.to_string()),
             error => Failure::Input(error.to_string()),
         }
     }
