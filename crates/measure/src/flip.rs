@@ -2,6 +2,7 @@
 //! 2021, Visualizing Errors in Rendered High Dynamic Range Images).
 
 use crate::{Image, MeasureError, metric::check_pair};
+use lobelia_lobes::tonemap::srgb_decode;
 use std::f64::consts::PI;
 
 /// Pixels per degree of visual angle where nobody says: 0.7 m from a display of 0.7 m and 3840 pixels.
@@ -25,10 +26,7 @@ impl Flip {
 /// FLIP of pictures as they are displayed: sRGB-encoded values in [0, 1]; what is outside is clamped.
 pub fn flip_ldr(reference: &Image, test: &Image, pixels_per_degree: f64) -> Result<Flip, MeasureError> {
     check_pair(reference, test)?;
-    let decode = |value: f32| {
-        let value = f64::from(value).clamp(0.0, 1.0);
-        if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
-    };
+    let decode = |value: f32| srgb_decode(f64::from(value).clamp(0.0, 1.0));
     let linear = |image: &Image| image.pixels.iter().map(|pixel| pixel.map(decode)).collect::<Vec<_>>();
     let filters = Filters::new(pixels_per_degree)?;
     Ok(Flip::new(difference(&filters, [reference.width, reference.height], &linear(reference), &linear(test))))

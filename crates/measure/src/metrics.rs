@@ -7,6 +7,7 @@ use crate::{
     ssim::ssim,
 };
 use glam::DVec3;
+use lobelia_lobes::{luminance, tonemap::srgb_encode};
 use serde::{Deserialize, Serialize};
 
 /// Metrics by name. Radiance is compared as it is; PSNR, SSIM and LDR-FLIP see both pictures as [`display`] shows them.
@@ -51,12 +52,12 @@ mod unbounded {
 
 /// Radiance as it is displayed: so exposed that the mean luminance of the reference is middle grey (0.18), under a fit of the ACES curve, sRGB-encoded.
 pub fn display(reference: &Image, image: &Image) -> Image {
-    let luminance = |pixel: &[f32; 3]| DVec3::from(pixel.map(f64::from)).dot(DVec3::new(0.2126, 0.7152, 0.0722));
-    let mean = reference.pixels.iter().map(luminance).sum::<f64>() / reference.pixels.len().max(1) as f64;
+    let luminance_of = |pixel: &[f32; 3]| luminance(DVec3::from(pixel.map(f64::from)));
+    let mean = reference.pixels.iter().map(luminance_of).sum::<f64>() / reference.pixels.len().max(1) as f64;
     let exposure = if mean > 0.0 && mean.is_finite() { 0.18 / mean } else { 1.0 };
     let shown = |value: f32| {
         let linear = flip::aces(f64::from(value).max(0.0) * exposure);
-        (if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }) as f32
+        srgb_encode(linear) as f32
     };
     Image { pixels: image.pixels.iter().map(|pixel| pixel.map(shown)).collect(), ..image.clone() }
 }

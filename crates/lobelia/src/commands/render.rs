@@ -10,6 +10,7 @@ use lobelia::{
     explain::mebibytes,
     frame::{DisplayImage, Radiance, SceneWorld},
     graph::{FrameReport, Plan, Resource, RunOptions, Timing},
+    measure::timing::Summary,
 };
 use std::{
     io::Write,
@@ -228,14 +229,8 @@ fn write_profile(path: &Path, reports: &[FrameReport]) -> Result<(), Failure> {
     lobelia::graph::timing::write_chrome_trace(path, reports).map_err(|error| Failure::Run(format!("{}: {error}", path.display())))
 }
 
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    match values.len() {
-        0 => None,
-        odd if odd % 2 == 1 => Some(values[middle]),
-        _ => Some((values[middle - 1] + values[middle]) / 2.0),
-    }
+fn median(values: Vec<f64>) -> Option<f64> {
+    Summary::of(values).map(|summary| summary.median)
 }
 
 /// A row of the table: a pass with medians over frames.
