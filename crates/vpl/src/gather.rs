@@ -261,7 +261,8 @@ fn check_visibility(visibility: &LightVisibilityShape, extent: [u32; 2], lights:
     }
     if visibility.interleave != interleave && visibility.interleave != 1 {
         let message = format!("it is interleaved {0} x {0}, but lights are gathered {interleave} x {interleave}", visibility.interleave);
-        return Err(PortError::at("visibility", message).help(format!("set interleave of the visibility pass to {interleave}, or to 1")));
+        let or_one = if interleave == 1 { "" } else { ", or to 1" };
+        return Err(PortError::at("visibility", message).help(format!("set interleave of the visibility pass to {interleave}{or_one}")));
     }
     if visibility.interleave != interleave && visibility.chunks() > 1 {
         return Err(PortError::at("visibility", "it is too large to be read in another interleaving than its own")
