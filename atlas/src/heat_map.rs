@@ -272,6 +272,7 @@ fn draw_curves(area: &Area<'_>, curves: &Curves) -> Result<(), DrawError> {
     let mut chart = ChartBuilder::on(area)
         .caption(&curves.title, ("sans-serif", 15))
         .margin(8)
+        .margin_right(20)
         .x_label_area_size(38)
         .y_label_area_size(52)
         .build_cartesian_2d(curves.x.ends(), LOW..1.0)
@@ -307,12 +308,18 @@ fn draw_curves(area: &Area<'_>, curves: &Curves) -> Result<(), DrawError> {
     }
     chart
         .configure_series_labels()
-        .position(SeriesLabelPosition::UpperRight)
+        .position(legend_corner(curves))
         .background_style(WHITE.mix(0.85))
         .border_style(BLACK.mix(0.2))
         .label_font(("sans-serif", 12))
         .draw()
         .map_err(failed)
+}
+
+/// The upper corner that the lines leave free.
+fn legend_corner(curves: &Curves) -> SeriesLabelPosition {
+    let ends = |pick: fn(&[f64]) -> Option<&f64>| curves.lines.iter().filter_map(|(_, errors)| pick(errors)).copied().fold(0.0, f64::max);
+    if ends(<[f64]>::last) > ends(<[f64]>::first) { SeriesLabelPosition::UpperLeft } else { SeriesLabelPosition::UpperRight }
 }
 
 fn draw_bar(area: &Area<'_>, height: u32) -> Result<(), DrawError> {
