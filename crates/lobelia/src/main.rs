@@ -31,11 +31,8 @@ struct Arguments {
 enum Command {
     /// Render a scene through a graph.
     Render(Box<commands::render::Arguments>),
-    /// Render several techniques, measure each against the truth, and write a page about it.
     Compare(Box<commands::compare::Arguments>),
-    /// Run every combination of scenes, variants, parameters and seeds, and plot error against time.
     Sweep(commands::sweep::Arguments),
-    /// Path-trace the truth on the CPU.
     Reference(commands::reference::Arguments),
     /// List passes, or describe one: ports, parameters, units, ranges, defaults.
     Passes(commands::passes::Arguments),

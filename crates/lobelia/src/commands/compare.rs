@@ -26,11 +26,14 @@ use std::{
 /// busy for all of them. The truth is path-traced, kept in the user's cache folder and never rendered twice (LOBELIA_CACHE names another folder); --reference takes
 /// a file instead. DIR gets report.html (one file, works without a network), report.json, and the pictures as EXR.
 #[derive(clap::Args, Clone, Debug)]
-#[command(after_help = "\
+#[command(
+    about = "Render several techniques, measure each against the truth, and write a page about it",
+    after_help = "\
 Examples:
   lobelia compare graphs/indirect.ron graphs/indirect.ron:no-visibility --scene builtin:cornell-glossy --report out
   lobelia compare graphs/indirect.ron:vpl graphs/indirect.ron:interleaved --output indirect.radiance --paths one-bounce --report out
-  lobelia compare graphs/direct.ron --scene room.glb --reference truth.exr --size 640x360 --report out")]
+  lobelia compare graphs/direct.ron --scene room.glb --reference truth.exr --size 640x360 --report out"
+)]
 pub struct Arguments {
     /// Graph file, with variants after a colon: FILE[:VARIANT[+VARIANT]].
     #[arg(value_name = "GRAPH", required = true)]

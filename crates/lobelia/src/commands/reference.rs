@@ -22,11 +22,14 @@ use std::{
 /// was killed goes on from there, and the picture is the same bit for bit as that of an unbroken run. Beside R.exr, R.variance.exr holds the variance of
 /// each pixel's value.
 #[derive(clap::Args, Clone, Debug)]
-#[command(after_help = "\
+#[command(
+    about = "Path-trace the truth on the CPU",
+    after_help = "\
 Examples:
   lobelia reference --scene builtin:cornell-glossy --paths one-bounce --spp 256 -o truth.exr
   lobelia reference --scene room.glb --camera sofa --size 1280x720 --paths full --error 0.02 -o room.exr
-  lobelia reference --scene room.glb --paths direct --spp 64 --threads 4 --seed 7 -o direct.exr")]
+  lobelia reference --scene room.glb --paths direct --spp 64 --threads 4 --seed 7 -o direct.exr"
+)]
 pub struct Arguments {
     #[command(flatten)]
     scene: SceneArguments,

@@ -21,7 +21,9 @@ use std::{
 /// DIR gets rows.jsonl, one line a run, and report.html. A sweep that was killed goes on where it was: no run is lost, none is repeated. A run that fails is recorded
 /// as failed and the rest goes on. --shard runs a part, so that many machines can share a sweep; --merge joins their folders.
 #[derive(clap::Args, Clone, Debug)]
-#[command(after_help = "\
+#[command(
+    about = "Run every combination of scenes, variants, parameters and seeds, and plot error against time",
+    after_help = "\
 Examples:
   lobelia sweep sweeps/lights.ron --report out
   lobelia sweep sweeps/lights.ron --report out --target-error 0.01
@@ -36,7 +38,8 @@ A sweep file:
       parameters: {\"lights.count\": [256, 1024, 4096]},
       seeds: [0, 1],
   )
-See docs/sweeps.md for all of its fields, and for Slurm and Kubernetes.")]
+See docs/sweeps.md for all of its fields, and for Slurm and Kubernetes."
+)]
 pub struct Arguments {
     /// Sweep file (RON).
     #[arg(value_name = "SWEEP.ron", required_unless_present = "merge", conflicts_with = "merge")]
