@@ -27,6 +27,28 @@ pub fn integrate(low: f64, high: f64, panels: usize, f: impl Fn(f64) -> f64) -> 
     0.5 * width * (0..panels).map(panel).sum::<f64>()
 }
 
+/// Integral of `f` over [low, high], panels halved until a panel and its halves agree to `tolerance` times the integral of |f|, or 40 times over.
+pub fn integrate_adaptive(low: f64, high: f64, tolerance: f64, f: impl Fn(f64) -> f64) -> f64 {
+    let panel = |low: f64, high: f64| {
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+        let terms = rule().iter().map(|(node, weight)| half * weight * f(middle + half * node));
+        terms.fold((0.0, 0.0), |(sum, size), term| (sum + term, size + term.abs()))
+    };
+    let (whole, mut scale) = panel(low, high);
+    let (mut total, mut open) = (0.0, vec![(low, high, whole, 0)]);
+    while let Some((low, high, coarse, depth)) = open.pop() {
+        let middle = 0.5 * (low + high);
+        let ((left, left_size), (right, right_size)) = (panel(low, middle), panel(middle, high));
+        scale = f64::max(scale, left_size + right_size);
+        if depth >= 3 && (left + right - coarse).abs() <= tolerance * scale || depth >= 40 {
+            total += left + right;
+        } else {
+            open.extend([(low, middle, left, depth + 1), (middle, high, right, depth + 1)]);
+        }
+    }
+    total
+}
+
 /// The exponent `-sharpness (1 - w.axis) - eta_x (w.x)^2 - eta_y (w.y)^2 - ...` of a product of Gaussian lobes on the sphere.
 #[derive(Clone, Debug, Default)]
 pub struct Exponent {
