@@ -55,6 +55,7 @@ pub fn modules() -> &'static [Source<'static>] {
         "ray",
         "raster",
         "reflective_shadow_map",
+        "sampling_density",
         "virtual_lights",
         "light_visibility",
         "intersect"

@@ -1,6 +1,5 @@
 //! The `vpl-gather` pass.
 
-use crate::reflectance_flags;
 use lobelia_frame::{GBuffer, ImageShape, LightVisibility, LightVisibilityShape, Radiance, SceneWorld, VirtualLights};
 use lobelia_graph::{
     BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OrNone, OutputShapes, Params, Pass, PlanContext,
@@ -98,7 +97,7 @@ impl Pass for VplGatherPass {
 
     fn specialise(context: &PlanContext<'_, Self>, inputs: &InputShapes<Self>) -> Vec<Specialisation> {
         let flags = inputs.gbuffer.flags;
-        let mut found = reflectance_flags(flags.specular, flags.normal_map, context.traits.ndf);
+        let mut found = flags.reflectance(context.traits.ndf);
         let visibility = inputs.visibility.is_some();
         found.push(Specialisation::new(
             "VISIBILITY",
