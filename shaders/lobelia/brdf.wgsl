@@ -125,7 +125,11 @@ fn evaluate_brdf(brdf: Brdf, n: vec3f, geometric_normal: vec3f, l: vec3f, v: vec
 // Mobile, 2014). It steers sampling and no picture depends on it, which is as well: for n.l >= 0.1 and GGX the specular part is off by up to 0.09
 // (dielectric) or 0.42 (rough white metal), mostly too low at grazing angles.
 fn albedo_estimate(brdf: Brdf, n_dot_l: f32) -> vec3f {
-    var albedo = brdf.diffuse * PI;
+    return brdf.diffuse * PI + specular_albedo(brdf, n_dot_l);
+}
+
+fn specular_albedo(brdf: Brdf, n_dot_l: f32) -> vec3f {
+    var albedo = vec3f(0.0);
 #ifdef SPECULAR
     let roughness = sqrt(brdf.alpha);
     let r = roughness * vec4f(-1.0, -0.0275, -0.572, 0.022) + vec4f(1.0, 0.0425, 1.04, -0.04);

@@ -55,8 +55,10 @@ pub fn modules() -> &'static [Source<'static>] {
         "ray",
         "raster",
         "reflective_shadow_map",
+        "patch_moments",
         "sampling_density",
         "virtual_lights",
+        "vsgl",
         "light_visibility",
         "intersect"
     ]

@@ -97,7 +97,7 @@ fn contribution(slot: u32, position: vec3f, surface: Surface, brdf: Brdf, to_vie
     let offset = light_position - position;
     let distance_squared = max(dot(offset, offset), settings.least_distance_squared);
     let direction = safe_normalize(offset, surface.normal);
-    let cosines = max(dot(surface.normal, direction), 0.0) * max(-dot(shared_lights[slot].normal, direction), 0.0);
+    let cosines = max(dot(surface.normal, direction), 0.0) * max(-dot(shared_lights[slot].geometric_normal, direction), 0.0);
     if cosines <= 0.0 {
         return vec3f(0.0);
     }

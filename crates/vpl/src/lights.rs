@@ -70,7 +70,7 @@ impl Pass for VplLightsPass {
 
     fn shape(context: &PlanContext<'_, Self>, inputs: &InputShapes<Self>) -> Result<OutputShapes<Self>, PortError> {
         inputs.density.check(&inputs.rsm)?;
-        Ok(OutputsShapes { lights: VirtualLightsShape { count: context.params.count, specular: inputs.rsm.flags.specular } })
+        Ok(OutputsShapes { lights: VirtualLightsShape { count: context.params.count, specular: inputs.rsm.flags.specular, lobes: false } })
     }
 
     fn create(context: &CreateContext<'_, Self>) -> Result<Self, BuildError> {

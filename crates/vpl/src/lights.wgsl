@@ -5,7 +5,7 @@
 #import lobelia::sampling::r2_point
 #import lobelia::sampling_density::sample_density
 #import lobelia::scene::PunctualLight
-#import lobelia::surface::{PackedSurface, unpack_surface}
+#import lobelia::surface::{PackedSurface, shading_normal_factor, unpack_surface}
 #import lobelia::virtual_lights::VirtualLight
 
 struct Settings {
@@ -61,9 +61,10 @@ fn pick(@builtin(global_invocation_id) id: vec3u) {
     let packed = packed_texel(sample.texel, sample.face);
     let surface = unpack_surface(packed);
     light.position = rsm_lifted_position(face, uv, depth, surface.geometric_normal, f32(resolution));
-    light.flux = min(rsm_flux(face, lights[face.light], uv, f32(resolution)) / (f32(settings.count) * sample.probability), vec3f(1e24));
     light.geometric_normal = octahedral_pack(surface.geometric_normal);
     light.direction_to_source = rsm_direction_to_light(face, light.position);
+    let flux = rsm_flux(face, lights[face.light], uv, f32(resolution)) * shading_normal_factor(surface, light.direction_to_source);
+    light.flux = min(flux / (f32(settings.count) * sample.probability), vec3f(1e24));
 #ifdef SPECULAR
     light.specular = packed.specular;
 #endif

@@ -1,0 +1,15 @@
+//! Virtual spherical Gaussian lights.
+
+mod gather;
+mod lights;
+
+pub use gather::{Form, Show, VsglGatherParams, VsglGatherPass};
+pub use lights::{Kernel, VsglLightsParams, VsglLightsPass};
+
+use lobelia_frame::SceneWorld;
+use lobelia_graph::Registry;
+
+/// Adds the passes of this crate.
+pub fn register(registry: &mut Registry<SceneWorld>) {
+    registry.add::<VsglLightsPass>().add::<VsglGatherPass>();
+}
