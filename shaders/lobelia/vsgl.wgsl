@@ -8,9 +8,9 @@
 // Flags: SPECULAR, NDF_PHONG, NORMAL_MAP.
 #define_import_path lobelia::vsgl
 
-#import lobelia::brdf::{Brdf, brdf_from_surface, ggx_visibility, phong_exponent, phong_visibility, specular_albedo}
-#import lobelia::asg::{AnisotropicSphericalGaussian, asg_sg_integral, asg_to_local}
-#import lobelia::math::{INV_PI, PI, fifth_power, safe_normalize}
+#import lobelia::brdf::{Brdf, brdf_from_surface, phong_exponent, phong_visibility, specular_albedo}
+#import lobelia::asg::{AnisotropicSphericalGaussian, asg_sg_integral, asg_sg_integral_printed, asg_to_local}
+#import lobelia::math::{INV_PI, PI, fifth_power, luminance, perpendicular, safe_normalize}
 #import lobelia::microfacet_lobe::{ggx_lobe_one, glossy_sg_light_two, phong_lobe, reflection_lobe_asg, reflection_lobe_sg}
 #import lobelia::octahedral::{octahedral_pack, octahedral_unpack}
 #import lobelia::patch_moments::patch_ndf_sharpness
@@ -19,6 +19,25 @@
 #import lobelia::sg_light::{bias_reduction_applies, combined_sharpness_bound, cone_scaled_sharpness, vsgl_kernel_diffuse_receiver, vsgl_kernel_fast}
 #import lobelia::surface::Surface
 #import lobelia::virtual_lights::{VirtualLight, VirtualLightLobes, virtual_light_surface}
+
+// The microfacet lobe of one end: how a surface reflects light between a fixed direction (to the viewer; at a light, to its source) and others.
+struct GlossyLobe {
+    normal: vec3f,
+    // The fixed direction, and its cosine and sine with the normal.
+    fixed_direction: vec3f,
+    cosine: f32,
+    sine: f32,
+    // Unit, in the surface: the fixed direction's projection, and across it.
+    along: vec3f,
+    across: vec3f,
+    alpha: f32,
+    // sqrt(alpha^2 + (1 - alpha^2) cos^2) of the fixed direction: its half of Smith's masking for GGX.
+    masking: f32,
+    // How much of the lobe is above the horizon.
+    above: f32,
+    reflectance_normal: vec3f,
+    reflectance_grazing: f32,
+}
 
 // A light, ready to be gathered.
 struct SgLight {
@@ -35,6 +54,13 @@ struct SgLight {
     // Its intensity at the axis, W/sr.
     specular: vec3f,
     axis: vec3f,
+    // The same lobe as that of a microfacet surface: flux falling on it, W, and how much wider than the surface's own it is, as an inverse sharpness.
+    flux: vec3f,
+    widening: f32,
+    lobe: GlossyLobe,
+#ifdef NDF_PHONG
+    sg_lobe: AnisotropicSphericalGaussian,
+#endif
 }
 
 // A surface, ready to receive.
@@ -42,15 +68,12 @@ struct SgReceiver {
     position: vec3f,
     normal: vec3f,
     geometric_normal: vec3f,
-    to_viewer: vec3f,
-    // Between normal and viewer.
-    cosine: f32,
+    // Diffuse albedo over pi.
+    diffuse: vec3f,
     brdf: Brdf,
-    // The reflection lobe: that of an SG distribution of normals.
-    lobe: AnisotropicSphericalGaussian,
-    // The view projected onto the surface, unit, and its length.
-    along: vec3f,
-    sine: f32,
+    // The reflection lobe, and that of an SG distribution of normals.
+    lobe: GlossyLobe,
+    sg_lobe: AnisotropicSphericalGaussian,
 }
 
 // Where a light is seen.
@@ -74,8 +97,36 @@ fn share_above(c: f32, spread: f32) -> f32 {
     return clamp(0.5 + c / (2.0 * sqrt(0.5 * spread) + 1e-4), 0.0, 1.0);
 }
 
-// A light of given lobes. The SG is cut off at the light's horizon and made larger by what that costs.
-fn sg_light_of_lobes(lobes: VirtualLightLobes) -> SgLight {
+#ifdef SPECULAR
+// Share of a reflection lobe that is above the horizon: a Gaussian of variance 2 alpha^2 + inverse sharpness about the mirror direction, whose integral is
+// written as a root.
+fn lobe_above(c: f32, alpha_squared: f32, inverse_sharpness: f32) -> f32 {
+    return 0.5 + 0.5 * c * inverseSqrt(c * c + 1.5707963 * (2.0 * alpha_squared + inverse_sharpness));
+}
+
+fn glossy_lobe(normal: vec3f, direction: vec3f, brdf: Brdf) -> GlossyLobe {
+    var lobe: GlossyLobe;
+    lobe.normal = normal;
+    lobe.fixed_direction = direction;
+    lobe.cosine = max(dot(normal, direction), 0.0);
+    let projected = direction - normal * dot(normal, direction);
+    let squared = dot(projected, projected);
+    lobe.sine = sqrt(min(squared, 1.0));
+    // What rounding has left of the normal in a short projection would be taken for a slope.
+    let straight = projected - normal * dot(normal, projected);
+    lobe.along = safe_normalize(select(perpendicular(normal), straight, squared > 1e-12), vec3f(1.0, 0.0, 0.0));
+    lobe.across = cross(normal, lobe.along);
+    lobe.alpha = brdf.alpha;
+    lobe.masking = sqrt(brdf.alpha * brdf.alpha + (1.0 - brdf.alpha * brdf.alpha) * lobe.cosine * lobe.cosine);
+    lobe.above = lobe_above(lobe.cosine, brdf.alpha * brdf.alpha, 0.0);
+    lobe.reflectance_normal = brdf.reflectance_normal;
+    lobe.reflectance_grazing = brdf.reflectance_grazing;
+    return lobe;
+}
+#endif
+
+// A light of given lobes, and the point at its centre. The SG is cut off at the light's horizon and made larger by what that costs.
+fn sg_light_of_lobes(lobes: VirtualLightLobes, point: VirtualLight) -> SgLight {
     var light: SgLight;
     light.position = lobes.position;
     light.radius = lobes.radius;
@@ -90,6 +141,24 @@ fn sg_light_of_lobes(lobes: VirtualLightLobes) -> SgLight {
     let upper = max(hemisphere_integral(light.sharpness, dot(light.axis, light.normal)), 0.25 * whole);
     // Over all normals a lobe loses nothing, over one what is below its horizon.
     light.specular = lobes.specular / mix(upper, whole, clamp(4.0 * light.spread, 0.0, 1.0));
+    // The surface that mirrors the source into the lobe's axis.
+    let surface = virtual_light_surface(point);
+    var brdf = brdf_from_surface(surface);
+    let normal = safe_normalize(light.axis + point.direction_to_source, surface.normal);
+    let cosine = max(dot(normal, point.direction_to_source), 0.0);
+    light.flux = lobes.specular / max(specular_albedo(brdf, cosine), vec3f(1e-4));
+    // Widths, of which even the broadest lobe has a finite one: near 0 a sharpness that was averaged has no digits.
+    let own = 1.0 / (2.0 + reflection_lobe_sg(patch_ndf_sharpness(brdf.alpha), normal, point.direction_to_source).sharpness);
+    let mean = 1.0 / (2.0 + light.sharpness);
+    light.widening = max(mean - own, 0.0);
+    // Where the patch is glossier than its centre.
+    brdf.alpha = max(brdf.alpha * sqrt(min(mean / own, 1.0)), 1e-3);
+    light.lobe = glossy_lobe(normal, point.direction_to_source, brdf);
+#ifdef NDF_PHONG
+    let ndf = phong_lobe(phong_exponent(brdf.alpha));
+    light.sg_lobe = reflection_lobe_asg(ndf.sharpness, normal, point.direction_to_source);
+    light.sg_lobe.amplitude = ndf.amplitude;
+#endif
 #endif
     return light;
 }
@@ -108,7 +177,7 @@ fn sg_light_of_point(point: VirtualLight) -> SgLight {
     lobes.lobe_axis = octahedral_pack(reflected.axis);
     lobes.lobe_sharpness = min(reflected.sharpness, 1e8);
 #endif
-    return sg_light_of_lobes(lobes);
+    return sg_light_of_lobes(lobes, point);
 }
 
 fn sg_receiver(position: vec3f, surface: Surface, brdf: Brdf, to_viewer: vec3f) -> SgReceiver {
@@ -116,8 +185,7 @@ fn sg_receiver(position: vec3f, surface: Surface, brdf: Brdf, to_viewer: vec3f) 
     receiver.position = position;
     receiver.normal = surface.normal;
     receiver.geometric_normal = surface.geometric_normal;
-    receiver.to_viewer = to_viewer;
-    receiver.cosine = max(dot(surface.normal, to_viewer), 0.0);
+    receiver.diffuse = brdf.diffuse;
     receiver.brdf = brdf;
 #ifdef SPECULAR
 #ifdef NDF_PHONG
@@ -125,13 +193,9 @@ fn sg_receiver(position: vec3f, surface: Surface, brdf: Brdf, to_viewer: vec3f) 
 #else
     let ndf = ggx_lobe_one(brdf.alpha);
 #endif
-    receiver.lobe = reflection_lobe_asg(ndf.sharpness, surface.normal, to_viewer);
-    receiver.lobe.amplitude = ndf.amplitude;
-    // The bitangent of the reflection lobe lies in the plane of incidence; its part in the surface is the direction of the projected view.
-    let projected = to_viewer - surface.normal * dot(surface.normal, to_viewer);
-    let squared = dot(projected, projected);
-    receiver.sine = sqrt(min(squared, 1.0));
-    receiver.along = select(cross(receiver.lobe.tangent, surface.normal), projected * inverseSqrt(max(squared, 1e-12)), squared > 1e-6);
+    receiver.sg_lobe = reflection_lobe_asg(ndf.sharpness, surface.normal, to_viewer);
+    receiver.sg_lobe.amplitude = ndf.amplitude;
+    receiver.lobe = glossy_lobe(surface.normal, to_viewer, brdf);
 #endif
     return receiver;
 }
@@ -145,6 +209,51 @@ fn sg_view(receiver: SgReceiver, light: SgLight) -> SgView {
     return SgView(direction, sqrt(distance_squared), spread_cosine(c, light.spread), share_above(c, light.spread));
 }
 
+// How a disk is seen from a surface.
+struct DiskView {
+    // Unit: where its light comes from on average.
+    direction: vec3f,
+    // Length of the irradiance vector of a disk of radiance 1 / area, 1/m^2: cos / d^2 for a point.
+    irradiance: f32,
+    // Solid angle over area, 1/m^2.
+    solid_angle: f32,
+    // Of an SG of that solid angle.
+    inverse_sharpness: f32,
+}
+
+// The irradiance vector of a uniform Lambertian disk is exact while no part of it is below the surface's horizon: from the form factors of a disk and
+// elements parallel and perpendicular to it (Siegel and Howell 2002, configurations 12 and 13), written without differences and without a division by
+// the area. A disk that would reach far through the surface counts as one of twice the radius that just touches it, since the patch that it stands for does not. The solid
+// angle is that of a spherical cap with the same vector.
+fn view_disk(receiver: SgReceiver, light: SgLight) -> DiskView {
+    let offset = light.position - receiver.position;
+    let d = dot(offset, offset);
+    let tilt = dot(light.normal, receiver.normal);
+    let above = max(dot(receiver.normal, offset), 0.0);
+    let square = min(light.radius * light.radius, 4.0 * above * above / max(1.0 - tilt * tilt, 1e-6));
+    // Height above the disk's plane, smoothed where its normals are spread.
+    let mean = -dot(light.normal, offset) * sqrt(max(1.0 - light.spread, 0.0));
+    let height = 0.5 * (mean + sqrt(mean * mean + 0.32 * light.spread * d));
+    let difference = d - square;
+    let q = max(sqrt(difference * difference + 4.0 * square * height * height), max(1e-9 * (d + square), 1e-36));
+    var parallel: f32;
+    if difference >= 0.0 {
+        parallel = (2.0 * height / q) * (height / (q + difference));
+    } else {
+        parallel = (q - difference) / (2.0 * q * square);
+    }
+    let radial = (2.0 * height / q) / (q + d + square);
+    let vector = offset * radial - light.normal * (parallel - radial * height);
+    let squared = dot(vector, vector);
+    if !(squared > 1e-36) {
+        return DiskView(receiver.normal, 0.0, 0.0, 0.0);
+    }
+    let irradiance = sqrt(squared);
+    let sine_squared = min(square * irradiance, 1.0);
+    let rim = 1.0 + sqrt(1.0 - sine_squared);
+    return DiskView(vector / irradiance, irradiance, 2.0 * irradiance / rim, 0.5 * sine_squared / rim);
+}
+
 // Whether a direction can be reflected to the viewer at all: with a normal map, both must be on one side of the geometric surface.
 fn faces(receiver: SgReceiver, direction: vec3f) -> bool {
 #ifdef NORMAL_MAP
@@ -155,103 +264,161 @@ fn faces(receiver: SgReceiver, direction: vec3f) -> bool {
 }
 
 #ifdef SPECULAR
-// G2 / (4 (n.v)) F for light from a direction: what the distribution of normals is multiplied with. 0 below the horizon.
-fn masking_and_fresnel(receiver: SgReceiver, direction: vec3f) -> vec3f {
-    let c = dot(receiver.normal, direction);
+// F G2 / (4 (n.v) (n.l)) for a cosine between normal and the free direction, and one between both directions.
+fn masking_and_fresnel(lobe: GlossyLobe, n_dot_l: f32, v_dot_l: f32) -> vec3f {
+#ifdef NDF_PHONG
+    let masking = phong_visibility(lobe.alpha, n_dot_l, max(lobe.cosine, 1e-4));
+#else
+    let alpha_squared = lobe.alpha * lobe.alpha;
+    let other = sqrt(alpha_squared + (1.0 - alpha_squared) * n_dot_l * n_dot_l);
+    let masking = 0.5 / max(n_dot_l * lobe.masking + lobe.cosine * other, 1e-20);
+#endif
+    // v.h = sqrt((1 + v.l) / 2).
+    let v_dot_h = sqrt(clamp(0.5 + 0.5 * v_dot_l, 0.0, 1.0));
+    return masking * mix(lobe.reflectance_normal, vec3f(lobe.reflectance_grazing), fifth_power(1.0 - v_dot_h));
+}
+
+// GGX filtered with the extent of an SG light in half vectors (Tokuyoshi et al. 2024), so that times G2 F / (4 (n.v) (n.l)) (n.l) and the light's energy it
+// gives reflected radiance. What integrates to 1 is D / (4 sqrt(alpha_along^2 s^2 + c^2)); the factor in front undoes its masking for a point light, for
+// which D itself is left. inverse_sharpness: of the light, >= 0.
+fn filtered_ggx(lobe: GlossyLobe, axis: vec3f, inverse_sharpness: f32) -> f32 {
+    let alpha_squared = lobe.alpha * lobe.alpha;
+    let u = max((1.0 - lobe.alpha) * (1.0 + lobe.alpha), 0.0);
+    let c_squared = lobe.cosine * lobe.cosine;
+    let wide = u * inverse_sharpness;
+    let along = alpha_squared + u * wide / (2.0 + wide);
+    let across = alpha_squared + u * wide / max(2.0 * c_squared + wide, 1e-6);
+    let h = safe_normalize(lobe.fixed_direction + axis, lobe.normal);
+    let x = dot(lobe.along, h);
+    let y = dot(lobe.across, h);
+    // 1 - x^2 - y^2 without the normal's rounding.
+    let bracket = x * x / along + y * y / across + max(1.0 - x * x - y * y, 0.0);
+    let s_squared = lobe.sine * lobe.sine;
+    // What spreads below the horizon is lost to the reflection but not to the light: the power is a fit to the energy over all lights.
+    let kept = lobe.above / lobe_above(lobe.cosine, alpha_squared, inverse_sharpness);
+    let normalisation = kept * sqrt(kept * (alpha_squared * s_squared + c_squared) / (along * across * max(along * s_squared + c_squared, 1e-12)));
+    return INV_PI * normalisation / (bracket * bracket);
+}
+
+// Reflectance of a light's specular lobe towards the receiver, 1/sr, as it is over the cone in which the light is seen.
+fn light_reflectance(light: SgLight, view: DiskView) -> vec3f {
+    let direction = -view.direction;
+    let c = dot(light.lobe.normal, direction);
     if !(c > 0.0) {
         return vec3f(0.0);
     }
+    let spread = view.inverse_sharpness + light.widening;
 #ifdef NDF_PHONG
-    let masking = phong_visibility(receiver.brdf.alpha, c, max(receiver.cosine, 1e-4)) * c;
+    let local = asg_to_local(light.sg_lobe, direction);
+    let sharpness = 1.0 / max(spread, 1e-8);
+    let shape = light.sg_lobe.amplitude * asg_sg_integral_printed(light.sg_lobe.eta_x, light.sg_lobe.eta_y, local, sharpness) / sg_integral(sharpness);
 #else
-    let masking = ggx_visibility(receiver.brdf.alpha, c, receiver.cosine) * c;
+    let shape = filtered_ggx(light.lobe, direction, spread);
 #endif
-    // v.h = sqrt((1 + v.l) / 2).
-    let v_dot_h = sqrt(clamp(0.5 + 0.5 * dot(receiver.to_viewer, direction), 0.0, 1.0));
-    let grazing = fifth_power(1.0 - v_dot_h);
-    return masking * mix(receiver.brdf.reflectance_normal, vec3f(receiver.brdf.reflectance_grazing), grazing);
+    return masking_and_fresnel(light.lobe, c, dot(light.lobe.fixed_direction, direction)) * shape;
 }
 
-// The direction in which the product of the reflection lobe and a light of sharpness `scaled / r^2` is about largest.
-fn dominant_direction(receiver: SgReceiver, axis: vec3f, scaled: f32, square: f32) -> vec3f {
-    let own = 2.0 * sqrt(receiver.lobe.eta_x) * sqrt(receiver.lobe.eta_y) * square;
-    return safe_normalize(receiver.lobe.axis * (own / (own + scaled)) + axis * (scaled / (own + scaled)), axis);
+// How far the light's lobe draws the direction that its light comes from to its own axis, over how far the cone holds it: an SG's sharpness over the
+// cone's, less in the lobe's tail, where GGX falls off as a power and an SG would draw without bound.
+fn lobe_pull(light: SgLight, view: DiskView) -> f32 {
+    let off = light.axis + view.direction;
+    return light.sharpness * view.inverse_sharpness / (1.0 + 0.25 * light.sharpness * dot(off, off));
 }
 
-// Radiance that a GGX surface reflects of an SG light that sends the irradiance 1 onto a surface facing it, over G2 / (4 (n.v)) F: GGX filtered with the
-// light's extent in half vectors (Tokuyoshi et al. 2024). The density that integrates to 1 is D / (4 sqrt(alpha_along^2 s^2 + c^2)); the factor
-// in front undoes its masking for a point light, whose result is exact. inverse_sharpness: of the light, >= 0.
-fn filtered_ggx(receiver: SgReceiver, axis: vec3f, inverse_sharpness: f32) -> f32 {
-    let alpha = receiver.brdf.alpha;
-    let alpha_squared = alpha * alpha;
-    let u = max((1.0 - alpha) * (1.0 + alpha), 0.0);
-    let c = receiver.cosine;
-    let wide = u * u * inverse_sharpness;
-    let along = alpha_squared + wide / (2.0 + u * inverse_sharpness);
-    let across = alpha_squared + wide / max(2.0 * c * c + u * inverse_sharpness, 1e-6);
-    let h = safe_normalize(receiver.to_viewer + axis, receiver.normal);
-    let x = dot(receiver.along, h);
-    let y = dot(receiver.lobe.tangent, h);
-    // 1 - x^2 - y^2 without the normal's rounding.
-    let z_squared = max(1.0 - x * x - y * y, 0.0);
-    let bracket = x * x / along + y * y / across + z_squared;
-    let s_squared = receiver.sine * receiver.sine;
-    let normalisation = sqrt((alpha_squared * s_squared + c * c) / (along * across * max(along * s_squared + c * c, 1e-12)));
-    return INV_PI * normalisation / (bracket * bracket);
-}
-#endif
-
-// The cheapest form that is sound everywhere. Energy of the cone is exact; cosines are smoothed over it by a hyperbola; a GGX lobe is filtered by the light's
-// extent, a Phong lobe is an ASG.
-fn vsgl_fast(receiver: SgReceiver, light: SgLight, view: SgView) -> vec3f {
-    if !faces(receiver, view.direction) {
+// Radiance that the glossy lobe reflects of an SG light that sends the irradiance 1 onto a surface facing it. What masks it is taken at about the largest
+// product of both lobes.
+fn glossy_fast(receiver: SgReceiver, axis: vec3f, inverse_sharpness: f32) -> vec3f {
+    let own = 2.0 * sqrt(receiver.sg_lobe.eta_x * receiver.sg_lobe.eta_y) * inverse_sharpness;
+    let share = own / (1.0 + own);
+    let c = mix(dot(receiver.normal, axis), receiver.lobe.cosine, share);
+    if !(c > 0.0) {
         return vec3f(0.0);
     }
-    let square = light.radius * light.radius;
-    let s = max(cone_scaled_sharpness(view.distance, light.radius), 1e-36);
-    let own = light.diffuse * (view.light_cosine * 4.0 / s);
-    let own_width = square / s;
-    var reflected = own * soft_cosine(dot(receiver.normal, view.direction), own_width);
-#ifdef SPECULAR
-    // The light's lobe in the cone.
-    let lobe = light.sharpness * square;
-    let sum = lobe + s;
-    let p = view.direction * (s / sum) - light.axis * (lobe / sum);
-    let p_squared = max(dot(p, p), 1e-12);
-    let p_inverse = inverseSqrt(p_squared);
-    let axis = p * p_inverse;
-    let d = light.axis + view.direction;
-    let n = sum * p_squared * p_inverse;
-    let shiny = light.specular * (view.above * 4.0 / n * exp(-light.sharpness * (s / sum) * dot(d, d) / (1.0 + p_squared * p_inverse)));
-    let width = square / n;
-    reflected += shiny * soft_cosine(dot(receiver.normal, axis), width);
-    reflected *= receiver.brdf.diffuse;
+    let v_dot_l = mix(dot(receiver.lobe.fixed_direction, axis), dot(receiver.lobe.fixed_direction, receiver.sg_lobe.axis), share);
 #ifdef NDF_PHONG
-    let local = asg_to_local(receiver.lobe, view.direction);
-    let lobe_local = -asg_to_local(receiver.lobe, light.axis);
-    let eta = vec2f(receiver.lobe.eta_x, receiver.lobe.eta_y);
-    let glossy = light.diffuse * (view.light_cosine * vsgl_kernel_fast(eta, local, 0.0, local, view.distance, light.radius))
-        + light.specular * (view.above * vsgl_kernel_fast(eta, lobe_local, light.sharpness, local, view.distance, light.radius));
-    let direction = dominant_direction(receiver, view.direction, s, square);
-    return reflected + glossy * receiver.lobe.amplitude * masking_and_fresnel(receiver, direction);
+    let sharpness = 1.0 / max(inverse_sharpness, 1e-8);
+    let local = asg_to_local(receiver.sg_lobe, axis);
+    let shape = receiver.sg_lobe.amplitude * asg_sg_integral_printed(receiver.sg_lobe.eta_x, receiver.sg_lobe.eta_y, local, sharpness) / sg_integral(sharpness);
 #else
-    let glossy = own * filtered_ggx(receiver, view.direction, own_width) + shiny * filtered_ggx(receiver, axis, width);
-    let direction = dominant_direction(receiver, view.direction, s, square);
-    return reflected + glossy * masking_and_fresnel(receiver, direction);
+    let shape = filtered_ggx(receiver.lobe, axis, inverse_sharpness);
 #endif
+    return masking_and_fresnel(receiver.lobe, c, v_dot_l) * (c * shape);
+}
+#endif
+
+// The cheapest form that is sound everywhere. The disk's irradiance is exact for a Lambertian light; GGX lobes of both ends are filtered by its extent (Phong
+// lobes are ASGs). For radius 0 it is the virtual point light, GGX included.
+fn vsgl_fast(receiver: SgReceiver, light: SgLight) -> vec3f {
+    let view = view_disk(receiver, light);
+    let c = dot(receiver.normal, view.direction);
+    if !(view.irradiance > 0.0 && c > 0.0 && faces(receiver, view.direction)) {
+        return vec3f(0.0);
+    }
+#ifdef SPECULAR
+    let shiny = light.flux * light_reflectance(light, view);
+    let emitted = light.diffuse + shiny;
+    // Both lobes of the light as one, whose axis the specular one pulls to itself by its share.
+    let pull = lobe_pull(light, view) * luminance(shiny) / max(luminance(emitted), 1e-30);
+    let p = view.direction - light.axis * pull;
+    let p_length = max(length(p), 1e-6);
+    let glossy = glossy_fast(receiver, p / p_length, view.inverse_sharpness / p_length);
+    return emitted * (receiver.diffuse * (view.irradiance * c) + glossy * view.solid_angle);
 #else
-    return reflected * receiver.brdf.diffuse;
+    return light.diffuse * receiver.diffuse * (view.irradiance * c);
 #endif
 }
 
-// Mean of max(n.l, 0) over an SG of the given inverse sharpness, c: the cosine with its axis. Within 0.03 of the exact mean; max(c, 0) for 0.
-fn soft_cosine(c: f32, inverse_sharpness: f32) -> f32 {
-    let mean = c / (1.0 + inverse_sharpness * (1.0 + 1.45 * inverse_sharpness));
-    return 0.5 * (mean + sqrt(mean * mean + 0.64 * inverse_sharpness / (1.0 + 2.2 * inverse_sharpness)));
+#ifdef SPECULAR
+fn glossy_accurate(receiver: SgReceiver, axis: vec3f, inverse_sharpness: f32) -> vec3f {
+    let alpha = receiver.lobe.alpha;
+    let sharpness = 1.0 / max(inverse_sharpness, 1e-8);
+#ifdef NDF_PHONG
+    let own = 2.0 * sqrt(receiver.sg_lobe.eta_x * receiver.sg_lobe.eta_y) * inverse_sharpness;
+    let c = mix(dot(receiver.normal, axis), receiver.lobe.cosine, own / (1.0 + own));
+    if !(c > 0.0) {
+        return vec3f(0.0);
+    }
+    // The distribution is an SG but for its tail.
+    let integral = asg_sg_integral(receiver.sg_lobe.eta_x, receiver.sg_lobe.eta_y, asg_to_local(receiver.sg_lobe, axis), sharpness);
+    return masking_and_fresnel(receiver.lobe, c, dot(receiver.lobe.fixed_direction, axis)) * (c * receiver.sg_lobe.amplitude * integral / sg_integral(sharpness));
+#else
+    if alpha > 0.5 || 2.0 * sharpness * alpha * alpha > 10.0 {
+        return glossy_fast(receiver, axis, inverse_sharpness);
+    }
+    // The two-lobe form carries its own masking; Fresnel's term is what is left.
+    let v_dot_h = sqrt(clamp(0.5 + 0.5 * dot(receiver.lobe.fixed_direction, axis), 0.0, 1.0));
+    let fresnel = mix(receiver.lobe.reflectance_normal, vec3f(receiver.lobe.reflectance_grazing), fifth_power(1.0 - v_dot_h));
+    return fresnel * (glossy_sg_light_two(alpha, receiver.normal, receiver.lobe.fixed_direction, axis, sharpness) / sg_integral(sharpness));
+#endif
+}
+#endif
+
+// The best forms: both lobes of the light by themselves, the accurate clamped cosine, GGX filtered by the light or as two peaks.
+fn vsgl_accurate(receiver: SgReceiver, light: SgLight) -> vec3f {
+    let view = view_disk(receiver, light);
+    let c = dot(receiver.normal, view.direction);
+    if !(view.irradiance > 0.0 && faces(receiver, view.direction)) {
+        return vec3f(0.0);
+    }
+    var reflected = light.diffuse * receiver.diffuse * (view.irradiance * max(c, 0.0));
+#ifdef SPECULAR
+    reflected += light.diffuse * glossy_accurate(receiver, view.direction, view.inverse_sharpness) * view.solid_angle;
+    let shiny = light.flux * light_reflectance(light, view) * view.solid_angle;
+    let p = view.direction - light.axis * lobe_pull(light, view);
+    let p_length = max(length(p), 1e-6);
+    let axis = p / p_length;
+    let inverse_sharpness = view.inverse_sharpness / p_length;
+    let sharpness = 1.0 / max(inverse_sharpness, 1e-8);
+    let across = cross(receiver.normal, axis);
+    let cosine = clamped_cosine_integral(sharpness, dot(receiver.normal, axis), min(dot(across, across), 1.0)) / sg_integral(sharpness);
+    reflected += shiny * (receiver.diffuse * cosine + glossy_accurate(receiver, axis, inverse_sharpness));
+#endif
+    return reflected;
 }
 
 // The form of the 2014 brief: cone and lobe as SGs of doubled peak, the surface's lobe as an ASG, cosines pulled out.
-fn vsgl_printed(receiver: SgReceiver, light: SgLight, view: SgView) -> vec3f {
+fn vsgl_printed(receiver: SgReceiver, light: SgLight) -> vec3f {
+    let view = sg_view(receiver, light);
     let c = dot(receiver.normal, view.direction);
     if !(c > 0.0 && faces(receiver, view.direction)) {
         return vec3f(0.0);
@@ -260,77 +427,26 @@ fn vsgl_printed(receiver: SgReceiver, light: SgLight, view: SgView) -> vec3f {
     var reflected = light.diffuse * (view.light_cosine * c * 4.0 / s);
 #ifdef SPECULAR
     reflected += light.specular * (view.above * c * vsgl_kernel_diffuse_receiver(-light.axis, light.sharpness, view.direction, view.distance, light.radius));
-    reflected *= receiver.brdf.diffuse;
-    let local = asg_to_local(receiver.lobe, view.direction);
-    let lobe_local = -asg_to_local(receiver.lobe, light.axis);
-    let eta = vec2f(receiver.lobe.eta_x, receiver.lobe.eta_y);
+    reflected *= receiver.diffuse;
+    let local = asg_to_local(receiver.sg_lobe, view.direction);
+    let lobe_local = -asg_to_local(receiver.sg_lobe, light.axis);
+    let eta = vec2f(receiver.sg_lobe.eta_x, receiver.sg_lobe.eta_y);
     let glossy = light.diffuse * (view.light_cosine * vsgl_kernel_fast(eta, local, 0.0, local, view.distance, light.radius))
         + light.specular * (view.above * vsgl_kernel_fast(eta, lobe_local, light.sharpness, local, view.distance, light.radius));
-    let direction = dominant_direction(receiver, view.direction, s, light.radius * light.radius);
-    return reflected + glossy * receiver.lobe.amplitude * masking_and_fresnel(receiver, direction);
+    let own = 2.0 * sqrt(receiver.sg_lobe.eta_x * receiver.sg_lobe.eta_y) * light.radius * light.radius / s;
+    let dominant = mix(c, receiver.lobe.cosine, own / (1.0 + own));
+    let shading = masking_and_fresnel(receiver.lobe, dominant, dot(receiver.lobe.fixed_direction, view.direction)) * dominant;
+    return reflected + glossy * receiver.sg_lobe.amplitude * shading;
 #else
-    return reflected * receiver.brdf.diffuse;
+    return reflected * receiver.diffuse;
 #endif
-}
-
-#ifdef SPECULAR
-// Radiance that the glossy lobe reflects of an SG light of peak radiance 1, by the best form there is for it.
-fn glossy_accurate(receiver: SgReceiver, axis: vec3f, sharpness: f32) -> vec3f {
-    let alpha = receiver.brdf.alpha;
-    let direction = dominant_direction(receiver, axis, sharpness, 1.0);
-#ifdef NDF_PHONG
-    // The distribution is an SG but for its tail.
-    let local = asg_to_local(receiver.lobe, axis);
-    let integral = asg_sg_integral(receiver.lobe.eta_x, receiver.lobe.eta_y, local, sharpness);
-    return masking_and_fresnel(receiver, direction) * (receiver.lobe.amplitude * integral);
-#else
-    let shading = masking_and_fresnel(receiver, direction);
-    if alpha > 0.5 || 2.0 * sharpness * alpha * alpha > 10.0 {
-        return shading * filtered_ggx(receiver, axis, 1.0 / max(sharpness, 1e-6)) * sg_integral(sharpness);
-    }
-    // The two-lobe form carries its own masking; Fresnel's term is what is left.
-    let v_dot_h = sqrt(clamp(0.5 + 0.5 * dot(receiver.to_viewer, direction), 0.0, 1.0));
-    let fresnel = mix(receiver.brdf.reflectance_normal, vec3f(receiver.brdf.reflectance_grazing), fifth_power(1.0 - v_dot_h));
-    return fresnel * glossy_sg_light_two(alpha, receiver.normal, receiver.to_viewer, axis, sharpness);
-#endif
-}
-#endif
-
-// The best forms: a Gaussian of positions times the SG of intensity, the accurate clamped cosine, GGX filtered by the light or as two peaks.
-fn vsgl_accurate(receiver: SgReceiver, light: SgLight, view: SgView) -> vec3f {
-    if !faces(receiver, view.direction) {
-        return vec3f(0.0);
-    }
-    // Sharpness 4 d^2 / r^2, at most 1e8.
-    let distance_squared = view.distance * view.distance;
-    let square = max(max(light.radius * light.radius, 4e-8 * distance_squared), 1e-36);
-    let position_sharpness = 4.0 * distance_squared / square;
-    let density = 2.0 * INV_PI / square;
-    let own = light.diffuse * (view.light_cosine * density);
-    let c = dot(receiver.normal, view.direction);
-    let across = cross(receiver.normal, view.direction);
-    var reflected = receiver.brdf.diffuse * own * clamped_cosine_integral(position_sharpness, c, min(dot(across, across), 1.0));
-#ifdef SPECULAR
-    reflected += own * glossy_accurate(receiver, view.direction, position_sharpness);
-    let sum = light.sharpness + position_sharpness;
-    let p = view.direction * (position_sharpness / max(sum, 1e-30)) - light.axis * (light.sharpness / max(sum, 1e-30));
-    let p_length = length(p);
-    let axis = safe_normalize(p, view.direction);
-    let d = light.axis + view.direction;
-    let amplitude = exp(-light.sharpness * (position_sharpness / max(sum, 1e-30)) * dot(d, d) / (1.0 + p_length));
-    let shiny = light.specular * (view.above * density * amplitude);
-    let sharpness = sum * p_length;
-    let shiny_across = cross(receiver.normal, axis);
-    reflected += shiny * (receiver.brdf.diffuse * clamped_cosine_integral(sharpness, dot(receiver.normal, axis), min(dot(shiny_across, shiny_across), 1.0)) + glossy_accurate(receiver, axis, sharpness));
-#endif
-    return reflected;
 }
 
 // Whether the disk may be taken for a point: every product of lobes is flatter than the cone times `threshold` (section 3.3 of the brief).
-fn vsgl_is_point(receiver: SgReceiver, light: SgLight, view: SgView, threshold: f32) -> bool {
+fn vsgl_is_point(receiver: SgReceiver, light: SgLight, distance: f32, threshold: f32) -> bool {
     var sharpest = 0.0;
 #ifdef SPECULAR
-    sharpest = combined_sharpness_bound(receiver.lobe.eta_x, receiver.lobe.eta_y, light.sharpness);
+    sharpest = combined_sharpness_bound(receiver.sg_lobe.eta_x, receiver.sg_lobe.eta_y, light.sharpness);
 #endif
-    return bias_reduction_applies(sharpest, threshold, view.distance, light.radius);
+    return bias_reduction_applies(sharpest, threshold, distance, light.radius);
 }

@@ -10,7 +10,7 @@
 #import lobelia::scene::{View, scene_position, view_depth}
 #import lobelia::surface::{PackedSurface, Surface, unpack_surface}
 #import lobelia::virtual_lights::{VirtualLight, VirtualLightLobes, virtual_light_surface}
-#import lobelia::vsgl::{SgLight, SgReceiver, sg_light_of_lobes, sg_light_of_point, sg_receiver, sg_view, vsgl_accurate, vsgl_fast, vsgl_is_point, vsgl_printed}
+#import lobelia::vsgl::{SgLight, SgReceiver, sg_light_of_lobes, sg_light_of_point, sg_receiver, vsgl_accurate, vsgl_fast, vsgl_is_point, vsgl_printed}
 
 struct Settings {
     light_count: u32,
@@ -89,7 +89,7 @@ fn share_light(slot: u32, index: u32) {
     if index < settings.light_count {
         let light = virtual_lights[index];
 #ifdef LOBES
-        entry.lobes = sg_light_of_lobes(lobes[index]);
+        entry.lobes = sg_light_of_lobes(lobes[index], light);
 #else
         entry.lobes = sg_light_of_point(light);
 #endif
@@ -114,21 +114,22 @@ fn point_contribution(slot: u32, receiver: SgReceiver, surface: Surface, directi
     }
     let geometry = cosines * solid_angle_over_disk_area(distance, shared_lights[slot].lobes.radius);
     let emitted = evaluate_brdf(shared_lights[slot].brdf, shared_lights[slot].normal, shared_lights[slot].geometric_normal, shared_lights[slot].to_source, -direction);
-    let reflected = evaluate_brdf(receiver.brdf, surface.normal, surface.geometric_normal, direction, receiver.to_viewer);
+    let reflected = evaluate_brdf(receiver.brdf, surface.normal, surface.geometric_normal, direction, receiver.lobe.fixed_direction);
     return min(shared_lights[slot].flux * min(emitted, vec3f(1e14)) * geometry, vec3f(1e20)) * min(reflected, vec3f(1e14));
 }
 #endif
 
 // What one light adds to the radiance of a surface.
 fn contribution(slot: u32, receiver: SgReceiver, surface: Surface) -> vec3f {
-    let seen = sg_view(receiver, shared_lights[slot].lobes);
 #ifdef BIAS_REDUCTION
-    let is_point = vsgl_is_point(receiver, shared_lights[slot].lobes, seen, settings.threshold);
+    let offset = shared_lights[slot].lobes.position - receiver.position;
+    let distance = length(offset);
+    let is_point = vsgl_is_point(receiver, shared_lights[slot].lobes, distance, settings.threshold);
 #ifdef SHOW_POINTS
     return vec3f(select(0.0, 1.0, is_point));
 #else
     if is_point {
-        return point_contribution(slot, receiver, surface, seen.direction, seen.distance);
+        return point_contribution(slot, receiver, surface, safe_normalize(offset, surface.normal), distance);
     }
 #endif
 #endif
@@ -136,12 +137,12 @@ fn contribution(slot: u32, receiver: SgReceiver, surface: Surface) -> vec3f {
     return vec3f(0.0);
 #else
 #ifdef FORM_PRINTED
-    let radiance = vsgl_printed(receiver, shared_lights[slot].lobes, seen);
+    let radiance = vsgl_printed(receiver, shared_lights[slot].lobes);
 #else
 #ifdef FORM_ACCURATE
-    let radiance = vsgl_accurate(receiver, shared_lights[slot].lobes, seen);
+    let radiance = vsgl_accurate(receiver, shared_lights[slot].lobes);
 #else
-    let radiance = vsgl_fast(receiver, shared_lights[slot].lobes, seen);
+    let radiance = vsgl_fast(receiver, shared_lights[slot].lobes);
 #endif
 #endif
     return min(radiance, vec3f(1e28));

@@ -1,8 +1,10 @@
 // Picks virtual spherical Gaussian lights: patches of a reflective shadow map as large as the light's share of the picture, read from averages.
 
 #import lobelia::averaged_direction::radius_from_variance
+#import lobelia::math::safe_normalize
+#import lobelia::microfacet_lobe::reflection_axis
 #import lobelia::octahedral::octahedral_pack
-#import lobelia::patch_moments::{PatchMoments, StoredPatchMoments, decode_sharpness, merge_patch_moments, patch_moments_address, patch_of_texel, unpack_patch_moments}
+#import lobelia::patch_moments::{PatchMoments, StoredPatchMoments, decode_sharpness, merge_patch_moments, patch_moments_address, patch_of_texel, patch_weight, unpack_patch_moments}
 #import lobelia::reflective_shadow_map::{RsmFace, rsm_direction_to_light, rsm_flux, rsm_lifted_position, rsm_texel_uv}
 #import lobelia::sampling::r2_point
 #import lobelia::sampling_density::{sample_density, sampling_density_total}
@@ -18,7 +20,7 @@ struct Settings {
     faces: u32,
     // Share of the density that a light's patch takes: overlap / count.
     share: f32,
-    // A patch grows no further where its variance would exceed this many times that of a flat one.
+    // Blocks whose variance exceeds this many times that of a flat one do not count.
     edges: f32,
     padding_a: u32,
     padding_b: u32,
@@ -106,18 +108,67 @@ fn tap(taps: Taps, index: i32) -> vec2u {
     return vec2u(clamp(taps.corner + vec2i(index & 1, index >> 1u), vec2i(0), taps.most));
 }
 
-// The patch around a texel, averaged bilinearly over blocks of a level.
-fn patch_around(level: u32, texel: vec2u, face: u32) -> PatchMoments {
-    let taps = taps_around(level, texel);
-    return merge_patch_moments(
-        array<PatchMoments, 4>(
-            block_at(level, tap(taps, 0), face),
-            block_at(level, tap(taps, 1), face),
-            block_at(level, tap(taps, 2), face),
-            block_at(level, tap(taps, 3), face),
-        ),
-        taps.shares,
-    );
+// A block's share in a patch around a texel: 0 where it lies across an edge or on another surface, so that patches grow along their own surface only.
+// `own` is the texel itself, with the spread of normals that its curvature makes over a texel.
+fn share_of_surface(block: PatchMoments, own: PatchMoments, level: u32) -> f32 {
+    let texels = f32(1u << (2u * level));
+    // Spread goes with the square of the side; on a flat surface next to none is left.
+    let curved = settings.edges * own.normal.one_minus_length_squared * texels + 1e-3;
+    let flat_variance = own.variance * texels;
+    let offset = dot(block.position - own.position, own.normal.axis);
+    let same = block.variance <= settings.edges * flat_variance
+        && offset * offset <= settings.edges * flat_variance * 0.25
+        && dot(block.normal.axis, own.normal.axis) > 0.5
+        && block.normal.one_minus_length_squared <= curved
+        && patch_weight(block) > 0.0;
+    return select(0.0, 1.0, same);
+}
+
+// Levels that a spline's patch is larger than its block: half the binary logarithm of 3.
+const SPLINE_LEVELS: f32 = 0.79248125;
+// Of a kernel on the light's own surface, for the patch to be read from it.
+const LEAST_SHARE: f32 = 0.05;
+
+struct Around {
+    patch_moments: PatchMoments,
+    // Mean weight of its texels.
+    weight: f32,
+    // Of the kernel that lies on the texel's own surface.
+    share: f32,
+}
+
+// The quadratic B-spline over three blocks, f: place in the middle one. Unlike a bilinear kernel it has the same variance wherever the texel lies in its
+// block: a quarter of the block's squared side, as much as a box of three times the area.
+fn spline(f: f32) -> vec3f {
+    return vec3f(0.5 * (1.0 - f) * (1.0 - f), 0.75 - (f - 0.5) * (f - 0.5), 0.5 * f * f);
+}
+
+// The patch around a texel, averaged over 3 x 3 blocks of a level.
+fn patch_around(level: u32, texel: vec2u, face: u32, own: PatchMoments) -> Around {
+    let place = (vec2f(texel) + vec2f(0.5)) / f32(1u << level);
+    let middle = vec2i(floor(place));
+    let across = spline(fract(place.x));
+    let down = spline(fract(place.y));
+    let side = i32(settings.side >> level);
+    var rows: array<PatchMoments, 4>;
+    var row_shares = vec4f(0.0);
+    var weight = 0.0;
+    for (var y = 0; y < 3; y++) {
+        var blocks: array<PatchMoments, 4>;
+        var shares = vec4f(0.0);
+        for (var x = 0; x < 3; x++) {
+            let block = middle + vec2i(x, y) - vec2i(1);
+            if all(block >= vec2i(0)) && all(block < vec2i(side)) {
+                blocks[x] = block_at(level, vec2u(block), face);
+                shares[x] = across[x] * down[y] * share_of_surface(blocks[x], own, level);
+                weight += shares[x] * textureLoad(weights, block, face, i32(level)).x;
+            }
+        }
+        row_shares[y] = shares.x + shares.y + shares.z;
+        rows[y] = merge_patch_moments(blocks, shares);
+    }
+    let sum = row_shares.x + row_shares.y + row_shares.z;
+    return Around(merge_patch_moments(rows, row_shares), weight / max(sum, 1e-30) / f32(1u << (2u * level)), sum);
 }
 
 // Mean weight of a texel in that patch.
@@ -187,29 +238,31 @@ fn pick(@builtin(global_invocation_id) id: vec3u) {
         }
     }
 #endif
-    level = min(level, f32(firstLeadingBit(settings.side)));
-    let whole = u32(max(floor(level), 0.0));
-    let own = patch_at(sample.texel, sample.face);
-    var lower = own;
-    var lower_level = 0u;
-    var part = max(level, 0.0) - f32(whole);
-    // Walk up while the patch stays as flat as its texel says: bilinear blocks of a plane have at most four times the variance of their area.
-    for (var next = 1u; next <= whole; next++) {
-        let candidate = patch_around(next, sample.texel, sample.face);
-        if candidate.variance > settings.edges * own.variance * f32(1u << (2u * next)) {
-            part = 0.0;
-            break;
+    // The spline's three times wider than its block.
+    level = min(level - SPLINE_LEVELS, f32(firstLeadingBit(settings.side)));
+    var own = patch_at(sample.texel, sample.face);
+    own.normal.one_minus_length_squared = 0.25 * block_at(1u, sample.texel / 2u, sample.face).normal.one_minus_length_squared;
+    var chosen = own;
+    var weight = sample.probability * total;
+    var size = level;
+    if level > 0.0 {
+        // The largest patch up to that level of which a part is on the light's own surface.
+        var whole = u32(level);
+        var lower = patch_around(whole, sample.texel, sample.face, own);
+        while lower.share < LEAST_SHARE && whole > 0u {
+            whole -= 1u;
+            size = f32(whole);
+            lower = patch_around(whole, sample.texel, sample.face, own);
         }
-        lower = candidate;
-        lower_level = next;
-    }
-    var chosen = lower;
-    var weight = mean_weight_around(lower_level, sample.texel, sample.face);
-    if part > 0.0 && lower_level == whole && whole < firstLeadingBit(settings.side) {
-        let upper = patch_around(whole + 1u, sample.texel, sample.face);
-        if upper.variance <= settings.edges * own.variance * f32(1u << (2u * (whole + 1u))) {
-            chosen = merge_patch_moments(array<PatchMoments, 4>(lower, upper, lower, upper), vec4f(1.0 - part, part, 0.0, 0.0));
-            weight = mix(weight, mean_weight_around(whole + 1u, sample.texel, sample.face), part);
+        chosen = lower.patch_moments;
+        weight = lower.weight;
+        let part = size - f32(whole);
+        if part > 0.0 {
+            let upper = patch_around(whole + 1u, sample.texel, sample.face, own);
+            if upper.share >= LEAST_SHARE {
+                chosen = merge_patch_moments(array<PatchMoments, 4>(chosen, upper.patch_moments, chosen, upper.patch_moments), vec4f(1.0 - part, part, 0.0, 0.0));
+                weight = mix(weight, upper.weight, part);
+            }
         }
     }
     // Flux over probability, both averaged over the patch: where the density follows the flux every light gets the same, at the borders of what is lit too.
@@ -218,16 +271,25 @@ fn pick(@builtin(global_invocation_id) id: vec3u) {
 #else
     let scale = total / (f32(settings.count) * max(weight, 1e-37));
 #endif
-    record.position = chosen.position;
+    // Lights that are as likely as their texels are bright, blurred over their patches, make an image of the patches' light that is blurred by half the variance
+    // times its second derivative. Drawn to the patch's mean by half the way they lose it again: so much brighter is the brighter side.
+    record.position = 0.5 * (own.position + chosen.position);
     // Below the finest level a patch is a part of its texel.
-    record.radius = radius_from_variance(chosen.variance * min(exp2(2.0 * level), 1.0));
+    record.radius = radius_from_variance(chosen.variance * min(exp2(2.0 * (level + SPLINE_LEVELS)), 1.0));
     record.diffuse = min(chosen.diffuse * scale, vec3f(1e24));
     record.normal = octahedral_pack(chosen.normal.axis);
     record.normal_one_minus_length_squared = chosen.normal.one_minus_length_squared;
 #ifdef SPECULAR
     record.specular = min(chosen.specular * scale, vec3f(1e24));
-    record.lobe_axis = octahedral_pack(chosen.lobe.axis);
-    record.lobe_sharpness = decode_sharpness(chosen.lobe.one_minus_length_squared);
+    // Directions to the source differ over the patch, and with them the lobes' directions: that is no spread of the lobe at any one place. So the lobe is taken
+    // about the mean normal that mirrors source and lobe into each other, and what the source's nearness spreads it by is taken away.
+    let to_source = rsm_direction_to_light(face, chosen.position);
+    let normal = safe_normalize(chosen.lobe.axis + to_source, surface.normal);
+    record.lobe_axis = octahedral_pack(reflection_axis(normal, light.direction_to_source));
+    let source_distance = select(distance(face.position, chosen.position), 1e18, face.depth_range != 0.0);
+    let nearness = record.radius / max(source_distance, 1e-18);
+    let lobe_sharpness = decode_sharpness(chosen.lobe.one_minus_length_squared);
+    record.lobe_sharpness = lobe_sharpness / max(1.0 - 0.25 * nearness * nearness * lobe_sharpness, 0.1);
 #endif
     light.radius = record.radius;
     virtual_lights[id.x] = light;
