@@ -64,7 +64,7 @@ struct Range {
 @group(0) @binding(15) var<storage, read_write> ratios: array<f32>;
 
 // Largest ratio that is kept, 1/(m^2 sr).
-const MOST_RATIO: f32 = 1e24;
+const MOST_RATIO: f32 = 1e18;
 
 // A texel, taken as a virtual light that flux falls on whose largest channel is 1.
 struct Emitter {
@@ -298,11 +298,20 @@ fn estimate(
                 for (var slot = part; slot < min(part + 16u, count); slot++) {
                     if view_samples[slot].seen {
                         seen += 1.0;
-                        sum += min(contribution(emitter, view_samples[slot]) * scale, MOST_RATIO);
+                        let ratio = min(contribution(emitter, view_samples[slot]) * scale, MOST_RATIO);
+#ifdef ROOT_MEAN_SQUARE
+                        sum += ratio * ratio;
+#else
+                        sum += ratio;
+#endif
                     }
                 }
             }
         }
     }
-    ratios[index] = select(-1.0, min(sum / max(seen, 1.0), MOST_RATIO), seen > 0.0);
+    var ratio = sum / max(seen, 1.0);
+#ifdef ROOT_MEAN_SQUARE
+    ratio = sqrt(ratio);
+#endif
+    ratios[index] = select(-1.0, min(ratio, MOST_RATIO), seen > 0.0);
 }

@@ -56,12 +56,31 @@ impl ParamValue for Lights {
     }
 }
 
+/// What the contributions of a texel to the view samples come to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Importance {
+    /// Their mean: the flux of light that reaches the camera.
+    Mean,
+    /// The root of their mean square, with which the variance of pixels is least.
+    #[default]
+    RootMeanSquare,
+}
+
+impl ParamValue for Importance {
+    fn kind() -> String {
+        "mean or root_mean_square".into()
+    }
+}
+
 /// Parameters of `brsm`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Params)]
 #[serde(default, deny_unknown_fields)]
 pub struct BrsmParams {
     /// How a texel shines on a view sample: `gaussian`, as a disk with lobes of spherical Gaussians, or `point`.
     pub lights: Lights,
+    /// What the contributions of a texel to the view samples come to: `mean`, or `root_mean_square`.
+    pub importance: Importance,
     /// Most cells a side of a face, rounded up to a power of two. Contributions are estimated once per cell, so the cost does not grow with the resolution of the
     /// map; texels of a cell share their contribution per reflected flux. As many as texels: every texel by itself.
     #[param(unit = "cells", range = 8..=1024)]
@@ -90,6 +109,7 @@ impl Default for BrsmParams {
     fn default() -> Self {
         Self {
             lights: Lights::Gaussian,
+            importance: Importance::RootMeanSquare,
             cells: 128,
             samples: 16384,
             subset: 64,
@@ -158,6 +178,8 @@ impl Pass for BrsmPass {
         let mut found = inputs.rsm.flags.reflectance(context.traits.ndf);
         let gaussian = context.params.lights == Lights::Gaussian;
         found.push(Specialisation::new("GAUSSIAN", gaussian, format!("lights is {}", if gaussian { "gaussian" } else { "point" })));
+        let square = context.params.importance == Importance::RootMeanSquare;
+        found.push(Specialisation::new("ROOT_MEAN_SQUARE", square, format!("importance is {}", if square { "root_mean_square" } else { "mean" })));
         found
     }
 

@@ -2,7 +2,7 @@
 
 mod density;
 
-pub use density::{BrsmParams, BrsmPass, Lights};
+pub use density::{BrsmParams, BrsmPass, Importance, Lights};
 
 use lobelia_frame::SceneWorld;
 use lobelia_graph::Registry;
