@@ -6,7 +6,7 @@
 #import lobelia::microfacet_lobe::{filtered_ndf_shading, ggx_lobe_one, glossy_sg_light_two, lobe_shading, phong_lobe, reflection_lobe_sg}
 #import lobelia::reflective_shadow_map::{RsmFace, rsm_direction_to_light, rsm_flux, rsm_footprint, rsm_lifted_position, rsm_position, rsm_texel_uv}
 #import lobelia::sampling::{hash, r2_point}
-#import lobelia::sampling_density::{descend_density, reflected_flux, sampling_density_total, storable_weight}
+#import lobelia::sampling_density::{descend_density, reflected_flux, sample_density, sampling_density_total, storable_weight}
 #import lobelia::scene::{PunctualLight, View, scene_position}
 #import lobelia::sg::sg_integral
 #import lobelia::sg_cosine::clamped_cosine_integral
@@ -86,10 +86,16 @@ struct ViewSample {
     normal: vec3f,
     geometric_normal: vec3f,
     to_viewer: vec3f,
+    // What contributions are multiplied by.
+    scale: f32,
     brdf: Brdf,
 }
 
 var<workgroup> view_samples: array<ViewSample, 64>;
+#ifdef RELATIVE
+var<workgroup> emitters: array<Emitter, 32>;
+var<workgroup> brightness: array<f32, 64>;
+#endif
 
 fn texel_surface(texel: vec2u, face: u32) -> Surface {
     var packed: PackedSurface;
@@ -172,6 +178,7 @@ fn load_view_sample(index: u32) -> ViewSample {
     let surface = unpack_surface(packed);
     out.position = scene_position(view, vec2f(pixel), depth);
     out.seen = true;
+    out.scale = 1.0;
     out.normal = surface.normal;
     out.geometric_normal = surface.geometric_normal;
     out.to_viewer = safe_normalize(view.position - out.position, surface.normal);
@@ -260,6 +267,48 @@ fn contribution(emitter: Emitter, at: ViewSample) -> f32 {
 }
 #endif
 
+fn lights_in_cell(flux: f32) -> f32 {
+    return settings.expected_lights * (flux / max(sampling_density_total(flux_sums), 1e-38));
+}
+
+// Contribution over reflected flux.
+fn ratio_of(emitter: Emitter, at: ViewSample) -> f32 {
+    return min(contribution(emitter, at) * select(0.0, 1.0 / emitter.reflected, emitter.reflected > 1e-30), MOST_RATIO);
+}
+
+#ifdef RELATIVE
+// Divides by the brightness of each view sample: what 32 texels, picked by flux, send on average, and a tenth of the mean of that on top, so that the darkest
+// pixels do not outweigh all others.
+fn scale_view_samples(local: u32, first_emitter: u32) {
+    if local < 32u {
+        var emitter: Emitter;
+        let found = sample_density(flux_sums, r2_point(first_emitter + local, ~settings.seed));
+        if found.probability > 0.0 {
+            let flux = textureLoad(flux_sums, found.texel >> vec2u(settings.level), found.face, settings.level).x;
+            emitter = load_emitter(found.texel, found.face, lights_in_cell(flux));
+        }
+        emitters[local] = emitter;
+    }
+    workgroupBarrier();
+    var own = 0.0;
+    if view_samples[local].seen {
+        for (var index = 0u; index < 32u; index++) {
+            own += ratio_of(emitters[index], view_samples[local]) / 32.0;
+        }
+    }
+    brightness[local] = own;
+    workgroupBarrier();
+    var sum = 0.0;
+    var seen = 0.0;
+    for (var index = 0u; index < 64u; index++) {
+        sum += brightness[index];
+        seen += select(0.0, 1.0, view_samples[index].seen);
+    }
+    let divisor = own + 0.1 * sum / max(seen, 1.0);
+    view_samples[local].scale = select(0.0, 1.0 / divisor, divisor > 1e-36);
+}
+#endif
+
 // A workgroup takes 64 cells that lie far apart and holds them against the same run of view samples: neighbouring cells meet other runs, and the blur that
 // follows brings these together. Every sixteen samples another texel stands for the cell, as likely as it reflects flux.
 @compute @workgroup_size(64)
@@ -277,7 +326,7 @@ fn estimate(
     let place = group % (stride * stride);
     let cell = vec2u(place % stride, place / stride) + stride * vec2u(local % 8u, local / 8u);
     let flux = textureLoad(flux_sums, cell, face, settings.level).x;
-    let lights_in_cell = settings.expected_lights * (flux / max(sampling_density_total(flux_sums), 1e-38));
+    let expected = lights_in_cell(flux);
     let index = (face * settings.cells + cell.y) * settings.cells + cell.x;
     // A multiple of the run's length, taken modulo the number of samples: all of them are met equally often.
     let start = (group * settings.subset) % settings.samples;
@@ -286,20 +335,25 @@ fn estimate(
     for (var first = 0u; first < settings.subset; first += 64u) {
         let count = min(settings.subset - first, 64u);
         workgroupBarrier();
+        var own_sample: ViewSample;
         if local < count {
-            view_samples[local] = load_view_sample((start + first + local) % settings.samples);
+            own_sample = load_view_sample((start + first + local) % settings.samples);
         }
+        view_samples[local] = own_sample;
         workgroupBarrier();
+#ifdef RELATIVE
+        scale_view_samples(local, group * settings.subset + first);
+        workgroupBarrier();
+#endif
         if flux > 0.0 {
             for (var part = 0u; part < count; part += 16u) {
                 let draw = r2_point((first + part) / 16u, hash(index) ^ settings.seed);
-                let emitter = load_emitter(descend_density(flux_sums, vec2i(cell), i32(face), i32(settings.level), draw).texel, face, lights_in_cell);
-                let scale = select(0.0, 1.0 / emitter.reflected, emitter.reflected > 1e-30);
+                let emitter = load_emitter(descend_density(flux_sums, vec2i(cell), i32(face), i32(settings.level), draw).texel, face, expected);
                 for (var slot = part; slot < min(part + 16u, count); slot++) {
                     if view_samples[slot].seen {
                         seen += 1.0;
-                        let ratio = min(contribution(emitter, view_samples[slot]) * scale, MOST_RATIO);
-#ifdef ROOT_MEAN_SQUARE
+                        let ratio = min(ratio_of(emitter, view_samples[slot]) * view_samples[slot].scale, MOST_RATIO);
+#ifdef RELATIVE
                         sum += ratio * ratio;
 #else
                         sum += ratio;
@@ -310,7 +364,7 @@ fn estimate(
         }
     }
     var ratio = sum / max(seen, 1.0);
-#ifdef ROOT_MEAN_SQUARE
+#ifdef RELATIVE
     ratio = sqrt(ratio);
 #endif
     ratios[index] = select(-1.0, min(ratio, MOST_RATIO), seen > 0.0);

@@ -62,14 +62,14 @@ impl ParamValue for Lights {
 pub enum Importance {
     /// Their mean: the flux of light that reaches the camera.
     Mean,
-    /// The root of their mean square, with which the variance of pixels is least.
+    /// The root of the mean square of each over the brightness of the pixel, with which the mean relative squared error of pixels is least.
     #[default]
-    RootMeanSquare,
+    Relative,
 }
 
 impl ParamValue for Importance {
     fn kind() -> String {
-        "mean or root_mean_square".into()
+        "mean or relative".into()
     }
 }
 
@@ -79,7 +79,8 @@ impl ParamValue for Importance {
 pub struct BrsmParams {
     /// How a texel shines on a view sample: `gaussian`, as a disk with lobes of spherical Gaussians, or `point`.
     pub lights: Lights,
-    /// What the contributions of a texel to the view samples come to: `mean`, or `root_mean_square`.
+    /// What the contributions of a texel to the view samples come to: `mean`, or `relative`, the root mean square of each over
+    /// the brightness of its pixel.
     pub importance: Importance,
     /// Most cells a side of a face, rounded up to a power of two. Contributions are estimated once per cell, so the cost does not grow with the resolution of the
     /// map; texels of a cell share their contribution per reflected flux. As many as texels: every texel by itself.
@@ -109,7 +110,7 @@ impl Default for BrsmParams {
     fn default() -> Self {
         Self {
             lights: Lights::Gaussian,
-            importance: Importance::RootMeanSquare,
+            importance: Importance::Relative,
             cells: 128,
             samples: 16384,
             subset: 64,
@@ -178,8 +179,8 @@ impl Pass for BrsmPass {
         let mut found = inputs.rsm.flags.reflectance(context.traits.ndf);
         let gaussian = context.params.lights == Lights::Gaussian;
         found.push(Specialisation::new("GAUSSIAN", gaussian, format!("lights is {}", if gaussian { "gaussian" } else { "point" })));
-        let square = context.params.importance == Importance::RootMeanSquare;
-        found.push(Specialisation::new("ROOT_MEAN_SQUARE", square, format!("importance is {}", if square { "root_mean_square" } else { "mean" })));
+        let relative = context.params.importance == Importance::Relative;
+        found.push(Specialisation::new("RELATIVE", relative, format!("importance is {}", if relative { "relative" } else { "mean" })));
         found
     }
 

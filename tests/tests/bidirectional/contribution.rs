@@ -85,7 +85,7 @@ fn worst(gpu: &Gpu, ndf: Ndf, strength: f64) -> f64 {
             "surfaces": given_gbuffer(specular: true),
             "rsm": rsm(resolution: {SIDE}),
             "flux": flux_density(),
-            "density": brsm(lights: point, cells: {SIDE}, samples: {SAMPLES}, subset: {SUBSET}, expected_lights: {LIGHTS}, flux_share: {SHARE}, blur: false, seed: 3),
+            "density": brsm(lights: point, importance: mean, cells: {SIDE}, samples: {SAMPLES}, subset: {SUBSET}, expected_lights: {LIGHTS}, flux_share: {SHARE}, blur: false, seed: 3),
         }}, output: "density.density")"#
     );
     let seed = 8;
@@ -125,7 +125,7 @@ fn weights_are_those_of_the_formula() {
 fn forms_apart(gpu: &Gpu, scene: &Scene, distance: f64, side: u32) -> (f64, f64) {
     let given = pixels(scene, distance, &mut Random(6));
     let parameters = format!("cells: {side}, expected_lights: 65536, subset: 512, flux_share: 0.001, blur: false");
-    let form = |lights: &str| both(gpu, scene, &given, side, &format!("lights: {lights}, {parameters}"), 0);
+    let form = |lights: &str| both(gpu, scene, &given, side, &format!("lights: {lights}, importance: mean, {parameters}"), 0);
     let ((gaussian, flux), (point, _)) = (form("gaussian"), form("point"));
     let total: f64 = flux.iter().sum();
     let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f64>() / total;
