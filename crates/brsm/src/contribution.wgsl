@@ -22,8 +22,8 @@ struct Settings {
     samples: u32,
     subset: u32,
     seed: u32,
-    // How many virtual lights the density is made for.
-    expected_lights: f32,
+    // How many disks of equal reflected flux the texels are taken for.
+    patches: f32,
     padding_a: u32,
     padding_b: u32,
 }
@@ -132,8 +132,8 @@ fn weigh(@builtin(global_invocation_id) id: vec3u) {
     textureStore(weights, id.xy, id.z, vec4f(storable_weight(texel_weight(id.xy, id.z)), 0.0, 0.0, 0.0));
 }
 
-// `lights_in_cell`: how many lights are expected in the cell if they are picked by flux.
-fn load_emitter(texel: vec2u, face_index: u32, lights_in_cell: f32) -> Emitter {
+// `share`: of how many patches the cell has the flux.
+fn load_emitter(texel: vec2u, face_index: u32, share: f32) -> Emitter {
     var emitter: Emitter;
     let resolution = textureDimensions(rsm_depth).x;
     let depth = textureLoad(rsm_depth, texel, face_index, 0);
@@ -154,7 +154,7 @@ fn load_emitter(texel: vec2u, face_index: u32, lights_in_cell: f32) -> Emitter {
     let width = rsm_footprint(face, depth, f32(resolution)) * f32(1u << settings.level);
     let slant = max(dot(surface.geometric_normal, emitter.to_source), 0.1);
     // No finer than the cell, and no more than 64 times as wide.
-    emitter.radius = width * inverseSqrt(PI * slant * clamp(lights_in_cell, 2.44140625e-4, 1.0));
+    emitter.radius = width * inverseSqrt(PI * slant * clamp(share, 2.44140625e-4, 1.0));
     return emitter;
 }
 
@@ -267,8 +267,9 @@ fn contribution(emitter: Emitter, at: ViewSample) -> f32 {
 }
 #endif
 
-fn lights_in_cell(flux: f32) -> f32 {
-    return settings.expected_lights * (flux / max(sampling_density_total(flux_sums), 1e-38));
+// How many of the patches of equal flux have the flux of a cell.
+fn patch_share(flux: f32) -> f32 {
+    return settings.patches * (flux / max(sampling_density_total(flux_sums), 1e-38));
 }
 
 // Contribution over reflected flux.
@@ -285,7 +286,7 @@ fn scale_view_samples(local: u32, first_emitter: u32) {
         let found = sample_density(flux_sums, r2_point(first_emitter + local, ~settings.seed));
         if found.probability > 0.0 {
             let flux = textureLoad(flux_sums, found.texel >> vec2u(settings.level), found.face, settings.level).x;
-            emitter = load_emitter(found.texel, found.face, lights_in_cell(flux));
+            emitter = load_emitter(found.texel, found.face, patch_share(flux));
         }
         emitters[local] = emitter;
     }
@@ -326,7 +327,7 @@ fn estimate(
     let place = group % (stride * stride);
     let cell = vec2u(place % stride, place / stride) + stride * vec2u(local % 8u, local / 8u);
     let flux = textureLoad(flux_sums, cell, face, settings.level).x;
-    let expected = lights_in_cell(flux);
+    let share = patch_share(flux);
     let index = (face * settings.cells + cell.y) * settings.cells + cell.x;
     // A multiple of the run's length, taken modulo the number of samples: all of them are met equally often.
     let start = (group * settings.subset) % settings.samples;
@@ -348,7 +349,7 @@ fn estimate(
         if flux > 0.0 {
             for (var part = 0u; part < count; part += 16u) {
                 let draw = r2_point((first + part) / 16u, hash(index) ^ settings.seed);
-                let emitter = load_emitter(descend_density(flux_sums, vec2i(cell), i32(face), i32(settings.level), draw).texel, face, expected);
+                let emitter = load_emitter(descend_density(flux_sums, vec2i(cell), i32(face), i32(settings.level), draw).texel, face, share);
                 for (var slot = part; slot < min(part + 16u, count); slot++) {
                     if view_samples[slot].seen {
                         seen += 1.0;

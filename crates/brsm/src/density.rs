@@ -96,10 +96,10 @@ pub struct BrsmParams {
     /// `1 / flux_share` times what picking by flux would make it. 1 is `flux-density`.
     #[param(range = 0.001..=1.0)]
     pub flux_share: f32,
-    /// Number of lights that the density is made for: each texel is taken for a disk as large as the patch that one of so many lights stands for, between one and
-    /// 64 times the width of its cell.
-    #[param(unit = "lights", range = 1..=65536)]
-    pub expected_lights: u32,
+    /// Each texel is taken for a disk as large as one of so many patches that reflect equal flux, but no smaller than its cell and at most 64 times as wide. Fewer
+    /// patches: larger disks, which a glossy surface is less likely to miss, and less weight where surfaces meet.
+    #[param(unit = "patches", range = 1..=65536)]
+    pub patches: u32,
     /// Whether a tent of 3 x 3 cells brings contributions per flux together.
     pub blur: bool,
     /// Added to the run's seed, to try other view samples with everything else equal.
@@ -111,11 +111,11 @@ impl Default for BrsmParams {
         Self {
             lights: Lights::Gaussian,
             importance: Importance::Relative,
-            cells: 128,
+            cells: 64,
             samples: 16384,
-            subset: 64,
-            flux_share: 0.15,
-            expected_lights: 1024,
+            subset: 256,
+            flux_share: 0.2,
+            patches: 16,
             blur: true,
             seed: 0,
         }
@@ -163,7 +163,7 @@ fn ratio_bytes(cells: u32, faces: u32) -> u64 {
 impl Pass for BrsmPass {
     const NAME: &'static str = "brsm";
     const DOC: &'static str = "Weighs the texels of reflective shadow maps by what they send to the camera: bidirectional reflective shadow maps.\n\
-        Ritschel et al. 2011; Tokuyoshi 2014, section 3.2. Lights go where they count in the picture, an eighth or so by flux alone. Knows nothing of what \
+        Ritschel et al. 2011; Tokuyoshi 2014, section 3.2. Lights go where they count in the picture, a fifth by flux alone. Knows nothing of what \
         stands between, and every texel that reflects light has a weight.";
     type World = SceneWorld;
     type Params = BrsmParams;
@@ -287,12 +287,12 @@ impl Pass for BrsmPass {
     }
 
     fn record(&mut self, frame: &mut Frame<'_>, _: &DeviceOf<Self>, bindings: &Bindings) -> Result<(), RunError> {
-        let BrsmParams { samples, subset, expected_lights, seed, .. } = self.params;
+        let BrsmParams { samples, subset, patches, seed, .. } = self.params;
         let subset = subset.min(samples);
         let faces = self.shape.faces.max(1);
         let level = (self.shape.side() / self.cells).max(1).ilog2();
         let seed = frame.info().seed.wrapping_add(seed);
-        let words = [self.cells, level, samples, subset, seed, (expected_lights as f32).to_bits(), 0, 0];
+        let words = [self.cells, level, samples, subset, seed, (patches as f32).to_bits(), 0, 0];
         frame.write_buffer(&self.buffers.estimate_settings, bytemuck::cast_slice(&words));
 
         let texels = self.shape.side().div_ceil(8);

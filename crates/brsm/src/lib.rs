@@ -21,7 +21,7 @@
 //! **Lights.** `point` is the form of 2011: the two reflectances at texel and pixel over the squared distance, which is bounded below by the radius of the
 //! disk that the texel stands for. `gaussian` is that of Tokuyoshi 2014, *Virtual Spherical Gaussian Lights for Real-Time Glossy Indirect Illumination*,
 //! section 3.2: the disk is seen as a cone, its specular lobe is an SG, and the products are integrated over the lobe of the pixel, so that `c` has no
-//! singularity and a mirror that narrowly misses the centre of a texel still counts. The disk's area is that of the patch of one of `expected_lights` lights, and no
+//! singularity and a mirror that narrowly misses the centre of a texel still counts. The disk's area is that of the patch of one of `patches` lights, and no
 //! smaller than the cell. Far from the patches the forms agree, to 5e-6 on diffuse surfaces and to about a tenth on glossy ones.
 //!
 //! Cells, the ratio to flux, runs that workgroups share and the root mean square are designs of this project. The view samples are points: the brief

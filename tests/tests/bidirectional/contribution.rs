@@ -18,7 +18,7 @@ use std::f64::consts::PI;
 const SIDE: usize = 16;
 const SAMPLES: u32 = 96;
 const SUBSET: u32 = 70;
-const LIGHTS: f64 = 500.0;
+const PATCHES: f64 = 500.0;
 const SHARE: f64 = 0.2;
 
 fn brdf(scene: &Scene, color: u32, word: u32) -> Brdf {
@@ -47,8 +47,8 @@ fn contribution(scene: &Scene, given: &Given, map: &Map, index: usize, flux_weig
     if slant < 1e-3 {
         return None;
     }
-    let lights_in_cell = LIGHTS * flux_weights[index] / flux_weights.iter().sum::<f64>();
-    let radius_squared = map.footprint(index).powi(2) / (PI * slant.max(0.1) * lights_in_cell.clamp(1.0 / 4096.0, 1.0));
+    let patch_share = PATCHES * flux_weights[index] / flux_weights.iter().sum::<f64>();
+    let radius_squared = map.footprint(index).powi(2) / (PI * slant.max(0.1) * patch_share.clamp(1.0 / 4096.0, 1.0));
     let flux = map.flux(scene, index);
     let (mut sum, mut seen) = (0.0, 0);
     for number in 0..SUBSET {
@@ -85,7 +85,7 @@ fn worst(gpu: &Gpu, ndf: Ndf, strength: f64) -> f64 {
             "surfaces": given_gbuffer(specular: true),
             "rsm": rsm(resolution: {SIDE}),
             "flux": flux_density(),
-            "density": brsm(lights: point, importance: mean, cells: {SIDE}, samples: {SAMPLES}, subset: {SUBSET}, expected_lights: {LIGHTS}, flux_share: {SHARE}, blur: false, seed: 3),
+            "density": brsm(lights: point, importance: mean, cells: {SIDE}, samples: {SAMPLES}, subset: {SUBSET}, patches: {PATCHES}, flux_share: {SHARE}, blur: false, seed: 3),
         }}, output: "density.density")"#
     );
     let seed = 8;
@@ -124,7 +124,7 @@ fn weights_are_those_of_the_formula() {
 /// Differences between the weights of both forms, and between those of points and of flux, as shares of all.
 fn forms_apart(gpu: &Gpu, scene: &Scene, distance: f64, side: u32) -> (f64, f64) {
     let given = pixels(scene, distance, &mut Random(6));
-    let parameters = format!("cells: {side}, expected_lights: 65536, subset: 512, flux_share: 0.001, blur: false");
+    let parameters = format!("cells: {side}, patches: 65536, subset: 512, flux_share: 0.001, blur: false");
     let form = |lights: &str| both(gpu, scene, &given, side, &format!("lights: {lights}, importance: mean, {parameters}"), 0);
     let ((gaussian, flux), (point, _)) = (form("gaussian"), form("point"));
     let total: f64 = flux.iter().sum();

@@ -89,7 +89,7 @@ fn what_cannot_be_is_refused() {
         ("subset: 0", "subset"),
         ("samples: 0", "samples"),
         ("cells: 4", "cells"),
-        ("expected_lights: 0", "expected_lights"),
+        ("patches: 0", "patches"),
         ("lights: disk", "lights"),
     ] {
         let refused = refusal(true, parameters, &scene).unwrap();
