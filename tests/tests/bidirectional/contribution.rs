@@ -1,7 +1,7 @@
 //! What texels send to given pixels, in f64.
 
 use crate::{
-    given::{EXTENT, Given, Random, position, run, turn, unpack_unit, view},
+    given::{EXTENT, Given, Random, pack_unit, position, run, turn, unpack_unit, view},
     maps::{Map, both, pixels, weights},
 };
 use glam::DVec3;
@@ -155,4 +155,31 @@ fn glossy_lobes_are_alike() {
         println!("{ndf}: difference {apart:.2}; from flux {from_flux:.2}");
         assert!(apart < 0.3 * from_flux, "{ndf}: {apart}, {from_flux}");
     }
+}
+
+/// Seen from the left and from the right: which side is darker moves the mean, and hardly what is relative to the brightness of pixels.
+#[test]
+fn relative_importance_forgives_dark_pixels() {
+    let Some(gpu) = gpu() else { return };
+    let scene = Scene::load("builtin:cornell-diffuse").unwrap();
+    let mut random = Random(9);
+    let mut given = |left: f64, right: f64| {
+        let mut given = pixels(&scene, 1.5, &mut random);
+        for (index, pixel) in given.pixels.iter_mut().enumerate() {
+            let (side, albedo) = if index as u32 % EXTENT[0] < EXTENT[0] / 2 { (1.0, left) } else { (-1.0, right) };
+            let root = (f64::sqrt(albedo) * 1023.0).round() as u32;
+            pixel.core = [pack_unit(DVec3::new(side, 0.0, 1.0).normalize()), (2 * root) | (2 * root) << 11 | root << 22];
+            pixel.depth = if pixel.depth > 0.0 { view(&scene).near / 2.0 } else { 0.0 };
+        }
+        given
+    };
+    let (even, uneven) = (given(0.5, 0.5), given(0.5, 0.05));
+    let moved = |importance: &str| {
+        let weigh = |given: &Given| both(gpu, &scene, given, 32, &format!("importance: {importance}, flux_share: 0.001"), 0).0;
+        let (first, second) = (weigh(&even), weigh(&uneven));
+        first.iter().zip(&second).map(|(a, b)| (a - b).abs()).sum::<f64>() / first.iter().sum::<f64>()
+    };
+    let (mean, relative) = (moved("mean"), moved("relative"));
+    println!("a darker side moves {mean:.3} of the mean, {relative:.3} of the relative weights");
+    assert!(mean > 0.1 && relative < 0.5 * mean, "{mean}, {relative}");
 }
