@@ -24,13 +24,31 @@
 //! singularity and a mirror that narrowly misses the centre of a texel still counts. The disk's area is that of the patch of one of `patches` lights, and no
 //! smaller than the cell. Far from the patches the forms agree, to 5e-6 on diffuse surfaces and to about a tenth on glossy ones.
 //!
-//! Cells, the ratio to flux, runs that workgroups share and the root mean square are designs of this project. The view samples are points: the brief
+//! **Importance.** `mean` is as published. `relative`, the default, divides `L(t -> x)` by the brightness of x, estimated with 32 texels picked by flux, plus a tenth of
+//! the mean of these, and takes the root of the mean square: with that density the mean relative squared error of pixels would be least, were it not for
+//! visibility. The mean spends lights on the brightest pixels, which need them least.
+//!
+//! Cells, the ratio to flux, runs that workgroups share and relative importance are designs of this project. The view samples are points: the brief
 //! filters them.
 //!
-//! **Stability.** The view samples are fixed in screen space by the seed: a camera that moves by a hundredth of a pixel changes 0.03 % of the weights of
-//! `builtin:cornell-glossy`, another seed 24 %. There is no smoothing over frames.
+//! **Stability.** The view samples are fixed in screen space by the seed: a camera that moves by a hundredth of a pixel changes 0.02 % of the weights of
+//! `builtin:cornell-glossy`, another seed 14 %. There is no smoothing over frames.
 //!
-//! TABLE
+//! **Error.** Relative squared error of `indirect.radiance` at 128 x 96 pixels, exact visibility, default clamp, against 32768 lights of the same estimator (half of them
+//! by flux), without the worst hundredth of the pixels; means over four seeds, with 256 / 1024 lights. Standard errors are 2 to 10 %.
+//!
+//! | density | `cornell-glossy` | ring caustic | atrium | living room |
+//! | --- | --- | --- | --- | --- |
+//! | `flux-density` | 0.018 / 0.0032 | 0.121 / 0.059 | 0.054 / 0.016 | 0.043 / 0.0131 |
+//! | `brsm`, gaussian | 0.015 / 0.0026 | 0.108 / 0.035 | 0.042 / 0.011 | 0.031 / 0.0069 |
+//!
+//! So it saves up to half of the lights, most where much of what is lit is out of view or glossy. The median pixel, diffuse and lit from all around, gains nothing, and
+//! neither do the brightest specks, glossy lobes that meet a single light: with these few pixels counted, the mean is too noisy to tell the densities
+//! apart. More patches (1024 instead of 16), so smaller disks, make the glossy box worse than flux (0.022): weights gather where surfaces meet, whose light the clamp
+//! of `vpl-gather` bounds.
+//!
+//! **Time.** On a software device `brsm` takes 13 % of a frame of 240 x 240 pixels and 256 lights with exact visibility, where `flux-density` takes 1.4 %; it does not grow
+//! with the picture, nor with the number of lights.
 
 mod density;
 
