@@ -58,9 +58,9 @@ fn what_is_gathered_is_the_same_on_average() {
     if gpu().is_none() {
         return;
     }
-    let flux = means("flux_density()", "", 0..48);
-    let gaussian = means("brsm()", "", 100..148);
-    let point = means("brsm(lights: point, flux_share: 0.05)", "", 200..248);
+    let flux = means("flux_density()", "", 0..24);
+    let gaussian = means("brsm()", "", 100..124);
+    let point = means("brsm(lights: point, flux_share: 0.05)", "", 200..224);
     let brighter: Vec<[f64; 9]> = flux.iter().map(|run| run.map(|value| value * 1.05)).collect();
     println!(
         "standard errors apart: gaussian {:.2}, point {:.2}, 5 % brighter {:.2}",
