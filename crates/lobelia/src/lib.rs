@@ -14,6 +14,7 @@
 //! # Ok(()) }
 //! ```
 
+pub use lobelia_brsm as brsm;
 pub use lobelia_compose as compose;
 pub use lobelia_direct as direct;
 pub use lobelia_frame as frame;
@@ -46,6 +47,7 @@ pub fn registry() -> Registry<SceneWorld> {
     let mut registry = Registry::new();
     lobelia_gbuffer::register(&mut registry);
     lobelia_rsm::register(&mut registry);
+    lobelia_brsm::register(&mut registry);
     lobelia_direct::register(&mut registry);
     lobelia_vpl::register(&mut registry);
     lobelia_vsgl::register(&mut registry);

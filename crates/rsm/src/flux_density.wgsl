@@ -1,9 +1,7 @@
 // Weights of texels in proportion to the flux that they reflect.
 
-#import lobelia::brdf::{albedo_estimate, brdf_from_surface}
-#import lobelia::math::luminance
 #import lobelia::reflective_shadow_map::{RsmFace, rsm_direction_to_light, rsm_flux, rsm_position, rsm_texel_uv}
-#import lobelia::sampling_density::storable_weight
+#import lobelia::sampling_density::{reflected_flux, storable_weight}
 #import lobelia::scene::PunctualLight
 #import lobelia::surface::{PackedSurface, unpack_surface}
 
@@ -20,7 +18,7 @@
 @group(0) @binding(6) var weights: texture_storage_2d_array<r32float, write>;
 
 // Luminance of the flux that a texel reflects, estimated; 0 where nothing is seen.
-fn reflected_flux(texel: vec2u, face_index: u32) -> f32 {
+fn texel_weight(texel: vec2u, face_index: u32) -> f32 {
     let resolution = textureDimensions(rsm_depth).x;
     if any(texel >= vec2u(resolution)) {
         return 0.0;
@@ -45,9 +43,7 @@ fn reflected_flux(texel: vec2u, face_index: u32) -> f32 {
 #endif
     let surface = unpack_surface(packed);
     let to_light = rsm_direction_to_light(face, rsm_position(face, uv, depth));
-    // The estimate of the specular albedo may be too low; a hundredth of the lobe's scale on top keeps every reflecting texel in play.
-    let albedo = albedo_estimate(brdf_from_surface(surface), max(dot(surface.normal, to_light), 0.0)) + vec3f(0.01 * surface.specular);
-    return luminance(flux * albedo);
+    return reflected_flux(surface, flux, to_light);
 }
 
 @compute @workgroup_size(8, 8)
@@ -55,5 +51,5 @@ fn weigh(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= textureDimensions(weights)) {
         return;
     }
-    textureStore(weights, id.xy, id.z, vec4f(storable_weight(reflected_flux(id.xy, id.z)), 0.0, 0.0, 0.0));
+    textureStore(weights, id.xy, id.z, vec4f(storable_weight(texel_weight(id.xy, id.z)), 0.0, 0.0, 0.0));
 }
