@@ -223,14 +223,14 @@ struct DiskView {
 
 // The irradiance vector of a uniform Lambertian disk is exact while no part of it is below the surface's horizon: from the form factors of a disk and
 // elements parallel and perpendicular to it (Siegel and Howell 2002, configurations 12 and 13), written without differences and without a division by
-// the area. A disk that would reach far through the surface counts as one of twice the radius that just touches it, since the patch that it stands for does not. The solid
+// the area. A disk that would reach far through the surface counts as one of three times the radius that just touches it, since the patch that it stands for does not. The solid
 // angle is that of a spherical cap with the same vector.
 fn view_disk(receiver: SgReceiver, light: SgLight) -> DiskView {
     let offset = light.position - receiver.position;
     let d = dot(offset, offset);
     let tilt = dot(light.normal, receiver.normal);
     let above = max(dot(receiver.normal, offset), 0.0);
-    let square = min(light.radius * light.radius, 4.0 * above * above / max(1.0 - tilt * tilt, 1e-6));
+    let square = min(light.radius * light.radius, 9.0 * above * above / max(1.0 - tilt * tilt, 1e-6));
     // Height above the disk's plane, smoothed where its normals are spread.
     let mean = -dot(light.normal, offset) * sqrt(max(1.0 - light.spread, 0.0));
     let height = 0.5 * (mean + sqrt(mean * mean + 0.32 * light.spread * d));

@@ -49,6 +49,9 @@ pub struct VsglLightsParams {
     /// A patch grows no further where its variance would exceed this many times that of a flat one of its size, as it does across an edge; `none` lets it.
     #[param(range = 1.0..)]
     pub edges: OrNone<f32>,
+    /// Least radius of a light, in units of that of a flat patch of its share: among leaves and folds patches find no room to grow, and would be points.
+    #[param(range = 0.0..=4.0)]
+    pub least_radius: f32,
     /// Shrink patches from frame to frame, each frame with lights of its own, so that the mean over frames converges (with the pass `progressive`, and
     /// bias reduction in the gathering): the variance of frame i + 1 is (i + 2/3) / (i + 1) times that of frame i.
     pub shrink: bool,
@@ -58,7 +61,7 @@ pub struct VsglLightsParams {
 
 impl Default for VsglLightsParams {
     fn default() -> Self {
-        Self { count: 1024, overlap: 4.0, kernel: Kernel::Mean, edges: OrNone::Value(8.0), shrink: false, seed: 0 }
+        Self { count: 1024, overlap: 4.0, kernel: Kernel::Mean, edges: OrNone::Value(3.0), least_radius: 0.7, shrink: false, seed: 0 }
     }
 }
 
@@ -160,7 +163,8 @@ impl Pass for VsglLightsPass {
         }
         let share = overlap / f64::from(params.count);
         let edges = params.edges.value().unwrap_or(f32::MAX);
-        let words = [params.count, seed, self.side, self.faces, (share as f32).to_bits(), edges.to_bits(), 0, 0];
+        let words =
+            [params.count, seed, self.side, self.faces, (share as f32).to_bits(), edges.to_bits(), params.least_radius.to_bits(), 0];
         frame.write_buffer(&self.settings, bytemuck::cast_slice(&words));
         let groups = params.count.div_ceil(64);
         frame.compute("pick lights", |pass| {

@@ -1,11 +1,11 @@
 // Picks virtual spherical Gaussian lights: patches of a reflective shadow map as large as the light's share of the picture, read from averages.
 
 #import lobelia::averaged_direction::radius_from_variance
-#import lobelia::math::safe_normalize
+#import lobelia::math::{INV_PI, safe_normalize}
 #import lobelia::microfacet_lobe::reflection_axis
 #import lobelia::octahedral::octahedral_pack
 #import lobelia::patch_moments::{PatchMoments, StoredPatchMoments, decode_sharpness, merge_patch_moments, patch_moments_address, patch_of_texel, patch_weight, unpack_patch_moments}
-#import lobelia::reflective_shadow_map::{RsmFace, rsm_direction_to_light, rsm_flux, rsm_lifted_position, rsm_texel_uv}
+#import lobelia::reflective_shadow_map::{RsmFace, rsm_direction_to_light, rsm_flux, rsm_footprint, rsm_lifted_position, rsm_texel_uv}
 #import lobelia::sampling::r2_point
 #import lobelia::sampling_density::{sample_density, sampling_density_total}
 #import lobelia::scene::PunctualLight
@@ -22,8 +22,9 @@ struct Settings {
     share: f32,
     // Blocks whose variance exceeds this many times that of a flat one do not count.
     edges: f32,
-    padding_a: u32,
-    padding_b: u32,
+    // Of a light's disk, in units of that of a flat patch of its share.
+    least_radius: f32,
+    padding: u32,
 }
 
 @group(0) @binding(0) var<uniform> settings: Settings;
@@ -275,7 +276,12 @@ fn pick(@builtin(global_invocation_id) id: vec3u) {
     // times its second derivative. Drawn to the patch's mean by half the way they lose it again: so much brighter is the brighter side.
     record.position = 0.5 * (own.position + chosen.position);
     // Below the finest level a patch is a part of its texel.
-    record.radius = radius_from_variance(chosen.variance * min(exp2(2.0 * (level + SPLINE_LEVELS)), 1.0));
+    let texels = exp2(2.0 * (level + SPLINE_LEVELS));
+    let footprint = rsm_footprint(face, depth, f32(resolution));
+    let stretch = 1.0 / max(dot(surface.geometric_normal, light.direction_to_source), 0.05);
+    // A patch that found no room to grow is still the only light of its share of the flux.
+    let nominal = footprint * sqrt(texels * stretch * INV_PI);
+    record.radius = max(radius_from_variance(chosen.variance * min(texels, 1.0)), settings.least_radius * nominal);
     record.diffuse = min(chosen.diffuse * scale, vec3f(1e24));
     record.normal = octahedral_pack(chosen.normal.axis);
     record.normal_one_minus_length_squared = chosen.normal.one_minus_length_squared;
