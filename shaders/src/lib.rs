@@ -57,6 +57,7 @@ pub fn modules() -> &'static [Source<'static>] {
         "reflective_shadow_map",
         "virtual_lights",
         "light_visibility",
+        "interleaving",
         "intersect"
     ]
 }

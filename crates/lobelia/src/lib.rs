@@ -28,6 +28,7 @@ pub use lobelia_scene as scene;
 pub use lobelia_shaders as shaders;
 pub use lobelia_visibility as visibility;
 pub use lobelia_vpl as vpl;
+pub use lobelia_vsl as vsl;
 
 pub mod explain;
 mod session;
@@ -47,6 +48,7 @@ pub fn registry() -> Registry<SceneWorld> {
     lobelia_rsm::register(&mut registry);
     lobelia_direct::register(&mut registry);
     lobelia_vpl::register(&mut registry);
+    lobelia_vsl::register(&mut registry);
     lobelia_visibility::register(&mut registry);
     lobelia_compose::register(&mut registry);
     registry

@@ -1,0 +1,37 @@
+//! Virtual spherical lights by Monte Carlo (Hasan, Krivanek, Walter and Bala 2009, *Virtual Spherical Lights for Many-Light Rendering of Glossy Scenes*).
+//!
+//! A virtual point light is bright without bound where it is near, and a glossy lobe sees it as a spot. [`vsl-gather`](VslGatherPass) takes each light
+//! for a sphere of radius r instead and integrates over the cone that it fills, with the full glTF reflectance at both ends:
+//!
+//! ```text
+//!   L(x, v) = sum_j  V_j  Phi_j / (pi r_j^2)  int_cone  f(x; w, v) (n_x . w)  f(y_j; s_j, -w) (n_j . -w) dw,      tan(half angle) = r_j / d_j
+//! ```
+//!
+//! with `Phi_j` the incident flux and `s_j` the direction to the source. Within a sphere the cone tends to a hemisphere. The radius is the distance to
+//! the k-th nearest light, so that the disks overlap; it falls as lights are added, and with it the bias. The estimator draws directions from the cone
+//! and from both reflectances, weighted by the balance heuristic (Veach and Guibas 1995). Visibility is that of the centre, as in the paper.
+
+mod gather;
+
+pub use gather::{RadiusSource, VslGatherParams, VslGatherPass};
+
+use lobelia_frame::SceneWorld;
+use lobelia_graph::{Registry, Specialisation};
+use lobelia_scene::Ndf;
+
+/// Adds the pass of this crate.
+pub fn register(registry: &mut Registry<SceneWorld>) {
+    registry.add::<VslGatherPass>();
+}
+
+/// Flags of reflectance, with reasons.
+fn reflectance_flags(specular: bool, normal_map: bool, ndf: Ndf) -> Vec<Specialisation> {
+    let specular_reason = if specular { "a material has a specular lobe" } else { "no material has a specular lobe: the lobe is dropped" };
+    let normal_reason = if normal_map { "a material has a normal map" } else { "no material has a normal map: the side test is dropped" };
+    let phong = specular && ndf == Ndf::Phong;
+    vec![
+        Specialisation::new("SPECULAR", specular, specular_reason),
+        Specialisation::new("NORMAL_MAP", normal_map, normal_reason),
+        Specialisation::new("NDF_PHONG", phong, format!("the scene's distribution is {ndf}")),
+    ]
+}
