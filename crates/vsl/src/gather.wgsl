@@ -115,9 +115,9 @@ fn narrower_than_cone(brdf: Brdf, versine: f32) -> bool {
 //
 //   Phi / (pi r^2)  int_cone  f_x(w) f_y(-w) (n_x . w) (-n_y . w) dw
 //
-// `random` differs from pixel to pixel and from light to light. Sample i of S takes one of up to three techniques, by stratum i of [0, 1): the cone,
-// the reflectance at the pixel, and that at the light, the last two where they are narrower than the cone. The balance heuristic divides by the mean of
-// their densities p; as |cone| / (pi r^2) = 2 / (s (s + d)) and |cone| p of the cone is 1, nothing is divided by r, and r = 0 is a point light.
+// `random` differs from pixel to pixel and from light to light. The samples are dealt out among up to three techniques: the cone, the reflectance at the
+// pixel, and that at the light, the last two where they are narrower than the cone; with fewer samples than techniques chance decides. The balance
+// heuristic divides by the mean of their densities p; as |cone| / (pi r^2) = 2 / (s (s + d)) and |cone| p of the cone is 1, nothing is divided by r, and r = 0 is a point light.
 fn contribution(slot: u32, position: vec3f, surface: Surface, brdf: Brdf, to_viewer: vec3f, random: u32) -> vec3f {
     let offset = shared_lights[slot].position - position;
     let distance = length(offset);
@@ -135,18 +135,23 @@ fn contribution(slot: u32, position: vec3f, surface: Surface, brdf: Brdf, to_vie
     }
     let sample_here = narrower_than_cone(brdf, versine);
     let sample_there = narrower_than_cone(shared_lights[slot].brdf, versine);
-    let share = 1.0 / (1.0 + f32(sample_here) + f32(sample_there));
-    let after_here = share * (1.0 + f32(sample_here));
+    let count = f32(settings.samples);
+    let techniques = 1.0 + f32(sample_here) + f32(sample_there);
+    let by_chance = count < techniques;
+    let each = select(floor(count / techniques), count / techniques, by_chance);
+    let count_there = select(0.0, each, sample_there);
+    let count_here = select(0.0, each, sample_here);
+    let count_cone = count - count_there - count_here;
     var total = vec3f(0.0);
     for (var i = 0u; i < settings.samples; i++) {
-        let technique = (f32(i) + unit_float(hash(random + i))) / f32(settings.samples);
+        let technique = min(f32(i) + select(0.5, unit_float(hash(~random + i)), by_chance), count - 1e-6);
         let u = r2_point(i, random);
         var direction: vec3f;
         var inside = true;
-        if technique < share {
+        if technique < count_cone {
             direction = sample_cone(axis, versine, u);
         } else {
-            if technique < after_here {
+            if technique < count - count_there {
                 let drawn = sample_brdf(brdf, surface.normal, to_viewer, u);
                 direction = drawn.direction;
                 inside = drawn.pdf > 0.0;
@@ -162,19 +167,19 @@ fn contribution(slot: u32, position: vec3f, surface: Surface, brdf: Brdf, to_vie
         if !inside || cosines <= 0.0 {
             continue;
         }
-        var density = 1.0;
+        var density = count_cone;
         if sample_here {
-            density += cone * brdf_pdf(brdf, surface.normal, to_viewer, direction);
+            density += count_here * cone * brdf_pdf(brdf, surface.normal, to_viewer, direction);
         }
         if sample_there {
-            density += cone * brdf_pdf(shared_lights[slot].brdf, normal, to_source, -direction);
+            density += count_there * cone * brdf_pdf(shared_lights[slot].brdf, normal, to_source, -direction);
         }
         let emitted = evaluate_brdf(shared_lights[slot].brdf, normal, shared_lights[slot].geometric_normal, to_source, -direction);
         let reflected = evaluate_brdf(brdf, surface.normal, surface.geometric_normal, direction, to_viewer);
         // Bounded factors, so that the product stays finite: infinity times a black channel would be NaN. (Each is below 1e12 by far.)
-        total += min(emitted, vec3f(1e9)) * min(reflected, vec3f(1e9)) * (cosines / (share * min(density, 1e18)));
+        total += min(emitted, vec3f(1e9)) * min(reflected, vec3f(1e9)) * (cosines / min(density, 1e18));
     }
-    let scale = 2.0 / (area * f32(settings.samples));
+    let scale = 2.0 / area;
     return min(min(shared_lights[slot].flux, vec3f(1e18)) * min(min(total, vec3f(1e18)) * scale, vec3f(1e18)), vec3f(1e30));
 }
 
