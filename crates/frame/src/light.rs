@@ -114,7 +114,7 @@ impl LightVisibilityShape {
     /// where whole visibility is read with interleaving.
     pub fn gathered_words(&self, words: u32) -> Vec<std::ops::Range<u32>> {
         if self.chunks() == 1 {
-            return vec![0..words];
+            return std::iter::once(0..words).collect();
         }
         let first = |index: u32| index * self.words_per_chunk();
         (0..self.chunks()).map(|index| first(index)..first(index) + self.words_in_chunk(index)).collect()
