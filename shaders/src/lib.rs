@@ -60,6 +60,7 @@ pub fn modules() -> &'static [Source<'static>] {
         "virtual_lights",
         "vsgl",
         "light_visibility",
+        "interleaving",
         "intersect"
     ]
 }

@@ -1,6 +1,6 @@
 use encase::ShaderType;
 use glam::{UVec2, Vec3};
-use lobelia_graph::{BufferPart, Part, PartSet, Resource, Values};
+use lobelia_graph::{BufferPart, Part, PartSet, PortError, Resource, Values};
 use wgpu::BufferUsages;
 
 /// Shape of [`VirtualLights`].
@@ -156,6 +156,39 @@ impl LightVisibilityShape {
     /// Words per pixel in chunk `index`.
     pub fn words_in_chunk(&self, index: u32) -> u32 {
         (self.words_per_pixel() - index * self.words_per_chunk()).min(self.words_per_chunk())
+    }
+
+    /// The words of each chunk in turn that a pass reads which gathers `words` words of lights a pixel; those of one chunk alone may be fewer than stored,
+    /// where whole visibility is read with interleaving.
+    pub fn gathered_words(&self, words: u32) -> Vec<std::ops::Range<u32>> {
+        if self.chunks() == 1 {
+            return std::iter::once(0..words).collect();
+        }
+        let first = |index: u32| index * self.words_per_chunk();
+        (0..self.chunks()).map(|index| first(index)..first(index) + self.words_in_chunk(index)).collect()
+    }
+
+    /// What a pass that gathers `lights` lights at `extent` pixels with the given interleaving can read: visibility of the same lights, the same picture, and
+    /// its own pattern, or any where the visibility is whole (interleave 1) and fits one chunk. Anything else is an error at port `visibility`.
+    pub fn check_gathering(&self, extent: [u32; 2], lights: u32, interleave: u32) -> Result<(), PortError> {
+        if self.extent != extent {
+            let [w, h] = self.extent;
+            return Err(PortError::at("visibility", format!("it is of a picture of {w} x {h} pixels, not {} x {}", extent[0], extent[1])));
+        }
+        if self.lights != lights {
+            return Err(PortError::at("visibility", format!("it is of {} lights, not of the {lights} that are gathered", self.lights))
+                .help("connect both to the same lights"));
+        }
+        if self.interleave != interleave && self.interleave != 1 {
+            let message = format!("it is interleaved {0} x {0}, but lights are gathered {interleave} x {interleave}", self.interleave);
+            let or_one = if interleave == 1 { "" } else { ", or to 1" };
+            return Err(PortError::at("visibility", message).help(format!("set interleave of the visibility pass to {interleave}{or_one}")));
+        }
+        if self.interleave != interleave && self.chunks() > 1 {
+            return Err(PortError::at("visibility", "it is too large to be read in another interleaving than its own")
+                .help(format!("set interleave of the visibility pass to {interleave}")));
+        }
+        Ok(())
     }
 }
 

@@ -30,6 +30,7 @@ pub use lobelia_shaders as shaders;
 pub use lobelia_visibility as visibility;
 pub use lobelia_vpl as vpl;
 pub use lobelia_vsgl as vsgl;
+pub use lobelia_vsl as vsl;
 
 pub mod explain;
 mod session;
@@ -51,6 +52,7 @@ pub fn registry() -> Registry<SceneWorld> {
     lobelia_direct::register(&mut registry);
     lobelia_vpl::register(&mut registry);
     lobelia_vsgl::register(&mut registry);
+    lobelia_vsl::register(&mut registry);
     lobelia_visibility::register(&mut registry);
     lobelia_compose::register(&mut registry);
     registry

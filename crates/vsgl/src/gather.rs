@@ -1,6 +1,6 @@
 //! The `vsgl-gather` pass.
 
-use lobelia_frame::{GBuffer, ImageShape, LightVisibility, LightVisibilityShape, Radiance, SceneWorld, VirtualLights};
+use lobelia_frame::{GBuffer, ImageShape, LightVisibility, Radiance, SceneWorld, VirtualLights};
 use lobelia_graph::{
     BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OrNone, OutputShapes, ParamValue, Params, Pass,
     PlanContext, PortError, Ports, RunError, Specialisation, TraitsOf, WorkRate,
@@ -182,7 +182,7 @@ impl Pass for VsglGatherPass {
             return Err(PortError::at("gbuffer", message).help("render a smaller picture"));
         }
         if let Some(visibility) = &inputs.visibility {
-            check_visibility(visibility, extent, inputs.lights.count, context.params.interleave)?;
+            visibility.check_gathering(extent, inputs.lights.count, context.params.interleave)?;
         }
         Ok(OutputsShapes { radiance: ImageShape { extent } })
     }
@@ -255,14 +255,7 @@ impl Pass for VsglGatherPass {
                 chunks.push(Chunk { words: 0..self.words, range, group });
             }
             Some(visibility) => {
-                let per_chunk = visibility.shape.words_per_chunk();
-                for (index, buffer) in visibility.chunks.iter().enumerate() {
-                    let first = index as u32 * per_chunk;
-                    let words = if visibility.chunks.len() == 1 {
-                        0..self.words
-                    } else {
-                        first..first + visibility.shape.words_in_chunk(index as u32)
-                    };
+                for (buffer, words) in visibility.chunks.iter().zip(visibility.shape.gathered_words(self.words)) {
                     let range = range_buffer();
                     let group = group(&self.gather, &range, Some(buffer))?;
                     chunks.push(Chunk { words, range, group });
@@ -305,26 +298,4 @@ impl Pass for VsglGatherPass {
         });
         Ok(())
     }
-}
-
-/// Visibility must be of the same lights, the same picture, and a pattern that this pass can read.
-fn check_visibility(visibility: &LightVisibilityShape, extent: [u32; 2], lights: u32, interleave: u32) -> Result<(), PortError> {
-    if visibility.extent != extent {
-        let [w, h] = visibility.extent;
-        return Err(PortError::at("visibility", format!("it is of a picture of {w} x {h} pixels, not {} x {}", extent[0], extent[1])));
-    }
-    if visibility.lights != lights {
-        return Err(PortError::at("visibility", format!("it is of {} lights, not of the {lights} that are gathered", visibility.lights))
-            .help("connect both to the same lights"));
-    }
-    if visibility.interleave != interleave && visibility.interleave != 1 {
-        let message = format!("it is interleaved {0} x {0}, but lights are gathered {interleave} x {interleave}", visibility.interleave);
-        let or_one = if interleave == 1 { "" } else { ", or to 1" };
-        return Err(PortError::at("visibility", message).help(format!("set interleave of the visibility pass to {interleave}{or_one}")));
-    }
-    if visibility.interleave != interleave && visibility.chunks() > 1 {
-        return Err(PortError::at("visibility", "it is too large to be read in another interleaving than its own")
-            .help(format!("set interleave of the visibility pass to {interleave}")));
-    }
-    Ok(())
 }
