@@ -21,6 +21,7 @@ pub use lobelia_gbuffer as gbuffer;
 pub use lobelia_graph as graph;
 pub use lobelia_lobes as lobes;
 pub use lobelia_measure as measure;
+pub use lobelia_progressive as progressive;
 pub use lobelia_reference as reference;
 pub use lobelia_report as report;
 pub use lobelia_rsm as rsm;
@@ -49,5 +50,6 @@ pub fn registry() -> Registry<SceneWorld> {
     lobelia_vpl::register(&mut registry);
     lobelia_visibility::register(&mut registry);
     lobelia_compose::register(&mut registry);
+    lobelia_progressive::register(&mut registry);
     registry
 }

@@ -63,6 +63,9 @@ pub struct Shot {
     pub frames: u32,
     /// Seconds between frames of an animated scene.
     pub frame_seconds: f32,
+    /// Frames are samples of one picture: each has a seed and sub-pixel offsets of its own, and animations stand still. Without, every frame draws
+    /// the same numbers, so that frames differ by what moves alone.
+    pub progressive: bool,
     /// Seed of everything random.
     pub seed: u32,
     /// Further resources to keep: `pass.port`.
@@ -81,6 +84,7 @@ impl Default for Shot {
             samples: 1,
             frames: 1,
             frame_seconds: 1.0 / 24.0,
+            progressive: false,
             seed: 0,
             keep: Vec::new(),
             specialise: true,
@@ -215,7 +219,7 @@ impl Session {
             sums: Vec::new(),
             reports: Vec::new(),
             view: None,
-            centre: mean_of_spread(shot.samples),
+            centre: mean_of_spread(if shot.progressive { shot.frames.saturating_mul(shot.samples) } else { shot.samples }),
         })
     }
 }
@@ -291,6 +295,7 @@ impl Rendering<'_> {
 
     /// Runs all frames and samples; `step` hears how far it is and stops it by returning `false`.
     pub fn run(&mut self, step: &mut dyn FnMut(&Step) -> bool) -> Result<Picture, SessionError> {
+        self.runner.reset_history();
         for frame in 0..self.shot.frames {
             self.advance(frame);
             self.sums = self.radiances().into_iter().map(|name| Sum { name, total: Vec::new() }).collect();
@@ -303,7 +308,7 @@ impl Rendering<'_> {
 
     /// Moves an animated scene on.
     fn advance(&mut self, frame: u32) {
-        if frame == 0 || self.session.scene.traits().animation_seconds <= 0.0 {
+        if frame == 0 || self.shot.progressive || self.session.scene.traits().animation_seconds <= 0.0 {
             return;
         }
         let mut scene = Scene::clone(&self.session.scene);
@@ -318,10 +323,11 @@ impl Rendering<'_> {
             return Err(RunError::Stopped.into());
         }
         let session = &*self.session;
-        let jitter = (spread(sample) - self.centre).as_vec2();
-        // Every sample has its own random numbers; the first has the seed itself.
-        let seed = self.shot.seed.wrapping_add(sample.wrapping_mul(0x9e37_79b9));
         let index = frame.wrapping_mul(self.shot.samples).wrapping_add(sample);
+        let draw = if self.shot.progressive { index } else { sample };
+        let jitter = (spread(draw) - self.centre).as_vec2();
+        // Every sample has its own random numbers; the first has the seed itself.
+        let seed = self.shot.seed.wrapping_add(draw.wrapping_mul(0x9e37_79b9));
         let view = ViewUniform::new(&self.camera, session.scene.origin(), self.shot.extent, jitter, index, seed, self.view.as_ref());
         session.device.set_view(session.gpu.queue(), &view);
         self.view = Some(view);
