@@ -36,7 +36,7 @@ pub mod sweep;
 pub mod trial;
 pub mod truth;
 
-pub use session::{Picture, Rendering, Session, SessionError, SessionOptions, Shot, Step};
+pub use session::{Picture, Rendering, Session, SessionError, SessionOptions, Shot, Step, frame_time};
 
 use lobelia_frame::SceneWorld;
 use lobelia_graph::Registry;
