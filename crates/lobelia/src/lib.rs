@@ -22,6 +22,7 @@ pub use lobelia_gbuffer as gbuffer;
 pub use lobelia_graph as graph;
 pub use lobelia_lobes as lobes;
 pub use lobelia_measure as measure;
+pub use lobelia_progressive as progressive;
 pub use lobelia_reference as reference;
 pub use lobelia_report as report;
 pub use lobelia_rsm as rsm;
@@ -38,7 +39,7 @@ pub mod sweep;
 pub mod trial;
 pub mod truth;
 
-pub use session::{Picture, Rendering, Session, SessionError, SessionOptions, Shot, Step};
+pub use session::{Picture, Rendering, Session, SessionError, SessionOptions, Shot, Step, frame_time};
 
 use lobelia_frame::SceneWorld;
 use lobelia_graph::Registry;
@@ -55,5 +56,6 @@ pub fn registry() -> Registry<SceneWorld> {
     lobelia_vsl::register(&mut registry);
     lobelia_visibility::register(&mut registry);
     lobelia_compose::register(&mut registry);
+    lobelia_progressive::register(&mut registry);
     registry
 }
