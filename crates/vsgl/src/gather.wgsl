@@ -202,6 +202,15 @@ fn gather(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_in
     }
 }
 
+// Radiance of a pixel: its own sum, or with interleaving the sum over all subsets of the lights by the tent filter of lobelia::interleaving.
+@compute @workgroup_size(8, 8)
+fn resolve(@builtin(global_invocation_id) id: vec3u) {
+    let extent = vec2u(view.extent);
+    if any(id.xy >= extent) {
+        return;
+    }
+    let own = sums[id.y * extent.x + id.x];
+    var result = own.xyz;
 #ifdef INTERLEAVED
     if own.w > 0.0 {
         let side = i32(settings.interleave);
