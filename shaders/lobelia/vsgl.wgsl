@@ -8,13 +8,14 @@
 // Flags: SPECULAR, NDF_PHONG, NORMAL_MAP.
 #define_import_path lobelia::vsgl
 
+#import lobelia::averaged_direction::{DIFFUSE_MEAN_COSINE, sharpness_from_averaged_direction}
 #import lobelia::brdf::{Brdf, brdf_from_surface, phong_exponent, phong_visibility, specular_albedo}
 #import lobelia::asg::{AnisotropicSphericalGaussian, asg_sg_integral, asg_sg_integral_printed, asg_to_local}
 #import lobelia::math::{INV_PI, PI, fifth_power, luminance, perpendicular, safe_normalize}
 #import lobelia::microfacet_lobe::{ggx_lobe_one, glossy_sg_light_two, phong_lobe, reflection_lobe_asg, reflection_lobe_sg}
 #import lobelia::octahedral::{octahedral_pack, octahedral_unpack}
 #import lobelia::patch_moments::patch_ndf_sharpness
-#import lobelia::sg::sg_integral
+#import lobelia::sg::{sg_integral, sg_product}
 #import lobelia::sg_cosine::{clamped_cosine_integral, hemisphere_integral}
 #import lobelia::sg_light::{bias_reduction_applies, combined_sharpness_bound, cone_scaled_sharpness, vsgl_kernel_diffuse_receiver, vsgl_kernel_fast}
 #import lobelia::surface::Surface
@@ -412,6 +413,39 @@ fn vsgl_accurate(receiver: SgReceiver, light: SgLight) -> vec3f {
     let across = cross(receiver.normal, axis);
     let cosine = clamped_cosine_integral(sharpness, dot(receiver.normal, axis), min(dot(across, across), 1.0)) / sg_integral(sharpness);
     reflected += shiny * (receiver.diffuse * cosine + glossy_accurate(receiver, axis, inverse_sharpness));
+#endif
+    return reflected;
+}
+
+// One lobe of the light as an SG of incoming radiance, gathered. `flux`: of the whole lobe, W.
+fn gaussian_lobe(receiver: SgReceiver, flux: vec3f, lobe_axis: vec3f, lobe_sharpness: f32, direction: vec3f, sharpness: f32, density: f32) -> vec3f {
+    let product = sg_product(-lobe_axis, lobe_sharpness, direction, sharpness);
+    let amplitude = flux * (density * exp(product.log_amplitude) / sg_integral(lobe_sharpness));
+    let across = cross(receiver.normal, product.axis);
+    let c = dot(receiver.normal, product.axis);
+    var reflected = receiver.diffuse * clamped_cosine_integral(product.sharpness, c, min(dot(across, across), 1.0));
+#ifdef SPECULAR
+    reflected += glossy_fast(receiver, product.axis, 1.0 / max(product.sharpness, 1e-3)) * sg_integral(product.sharpness);
+#endif
+    return amplitude * reflected;
+}
+
+// A Gaussian cloud of positions, whose intensity is two SGs (Tokuyoshi 2015; 2024): nothing in it has an edge, so it is the form for lights as large as what
+// they light, such as two for a whole scene. A flat patch leaks a little behind itself.
+fn vsgl_gaussian(receiver: SgReceiver, light: SgLight) -> vec3f {
+    let offset = light.position - receiver.position;
+    let d = dot(offset, offset);
+    // Variance per axis is r^2 / 4. The floor keeps the sharpness within 1e8, and a point on a point finite.
+    let square = max(max(light.radius * light.radius, 4e-8 * d), 1e-20);
+    let sharpness = 4.0 * d / square;
+    let density = 2.0 * INV_PI / square;
+    let direction = safe_normalize(offset, receiver.normal);
+    // A Lambertian lobe has a mean direction of length 2/3, spread normals make it shorter.
+    let mean = DIFFUSE_MEAN_COSINE * sqrt(max(1.0 - light.spread, 0.0));
+    let dull = sharpness_from_averaged_direction(mean, 1.0 - mean * mean);
+    var reflected = gaussian_lobe(receiver, light.diffuse * PI, light.normal, dull, direction, sharpness, density);
+#ifdef SPECULAR
+    reflected += gaussian_lobe(receiver, light.specular * sg_integral(light.sharpness), light.axis, light.sharpness, direction, sharpness, density);
 #endif
     return reflected;
 }

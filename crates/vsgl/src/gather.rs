@@ -31,11 +31,13 @@ pub enum Form {
     Fast,
     /// Gaussian position times SG intensity, the accurate clamped cosine, GGX filtered or as two peaks.
     Accurate,
+    /// A Gaussian cloud of positions times SGs of intensity (Tokuyoshi 2015, 2024): soft everywhere, for lights as large as what they light.
+    Gaussian,
 }
 
 impl ParamValue for Form {
     fn kind() -> String {
-        "printed, fast or accurate".into()
+        "printed, fast, accurate or gaussian".into()
     }
 }
 
@@ -60,7 +62,8 @@ impl ParamValue for Show {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Params)]
 #[serde(default, deny_unknown_fields)]
 pub struct VsglGatherParams {
-    /// Which closed form: `fast` (the cheapest that is sound everywhere), `accurate` (the best known), or `printed` (as the 2014 brief has it).
+    /// Which closed form: `fast` (the cheapest that is sound everywhere), `accurate` (both lobes of a light
+    /// by themselves, broad lights with the two-peak form), `gaussian` (soft, for lights as large as what they light), or `printed` (as the 2014 brief has it).
     pub form: Form,
     /// Threshold of consistent bias reduction, or `none`: a light whose lobes are flatter than its cone times this is gathered as a point with the true
     /// reflectance at both ends, so that more lights, which are smaller, converge to the truth. Larger: less bias, more of a point light's noise. The
@@ -154,12 +157,17 @@ impl Pass for VsglGatherPass {
         found.push(Specialisation::new(
             "FORM_PRINTED",
             form == Form::Printed,
-            format!("form is {}", ["printed", "fast", "accurate"][form as usize]),
+            format!("form is {}", ["printed", "fast", "accurate", "gaussian"][form as usize]),
         ));
         found.push(Specialisation::new(
             "FORM_ACCURATE",
             form == Form::Accurate,
-            format!("form is {}", ["printed", "fast", "accurate"][form as usize]),
+            format!("form is {}", ["printed", "fast", "accurate", "gaussian"][form as usize]),
+        ));
+        found.push(Specialisation::new(
+            "FORM_GAUSSIAN",
+            form == Form::Gaussian,
+            format!("form is {}", ["printed", "fast", "accurate", "gaussian"][form as usize]),
         ));
         let reduce = bias_reduction.value().is_some();
         found.push(Specialisation::new("BIAS_REDUCTION", reduce, if reduce { "bias_reduction is on" } else { "bias_reduction is none" }));

@@ -11,7 +11,7 @@
 #import lobelia::scene::{View, scene_position, view_depth}
 #import lobelia::surface::{PackedSurface, Surface, unpack_surface}
 #import lobelia::virtual_lights::{VirtualLight, VirtualLightLobes, virtual_light_surface}
-#import lobelia::vsgl::{SgLight, SgReceiver, sg_light_of_lobes, sg_light_of_point, sg_receiver, vsgl_accurate, vsgl_fast, vsgl_is_point, vsgl_printed}
+#import lobelia::vsgl::{SgLight, SgReceiver, sg_light_of_lobes, sg_light_of_point, sg_receiver, vsgl_accurate, vsgl_fast, vsgl_gaussian, vsgl_is_point, vsgl_printed}
 
 struct Settings {
     light_count: u32,
@@ -143,7 +143,11 @@ fn contribution(slot: u32, receiver: SgReceiver, surface: Surface) -> vec3f {
 #ifdef FORM_ACCURATE
     let radiance = vsgl_accurate(receiver, shared_lights[slot].lobes);
 #else
+#ifdef FORM_GAUSSIAN
+    let radiance = vsgl_gaussian(receiver, shared_lights[slot].lobes);
+#else
     let radiance = vsgl_fast(receiver, shared_lights[slot].lobes);
+#endif
 #endif
 #endif
     return min(radiance, vec3f(1e28));
