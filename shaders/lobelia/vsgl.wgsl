@@ -9,10 +9,10 @@
 #define_import_path lobelia::vsgl
 
 #import lobelia::averaged_direction::{DIFFUSE_MEAN_COSINE, sharpness_from_averaged_direction}
-#import lobelia::brdf::{Brdf, brdf_from_surface, phong_exponent, phong_visibility, specular_albedo}
+#import lobelia::brdf::{Brdf, brdf_from_surface, ggx_visibility, phong_exponent, phong_visibility, specular_albedo}
 #import lobelia::asg::{AnisotropicSphericalGaussian, asg_sg_integral, asg_sg_integral_printed, asg_to_local}
-#import lobelia::math::{INV_PI, PI, fifth_power, luminance, perpendicular, safe_normalize}
-#import lobelia::microfacet_lobe::{ggx_lobe_one, glossy_sg_light_two, phong_lobe, reflection_lobe_asg, reflection_lobe_sg}
+#import lobelia::math::{INV_PI, PI, fifth_power, luminance, safe_normalize}
+#import lobelia::microfacet_lobe::{ggx_lobe_one, glossy_sg_light_two, phong_lobe, reflection_axis, reflection_lobe_asg, reflection_lobe_sg}
 #import lobelia::octahedral::{octahedral_pack, octahedral_unpack}
 #import lobelia::patch_moments::patch_ndf_sharpness
 #import lobelia::sg::{sg_integral, sg_product}
@@ -24,18 +24,9 @@
 // The microfacet lobe of one end: how a surface reflects light between a fixed direction (to the viewer; at a light, to its source) and others.
 struct GlossyLobe {
     normal: vec3f,
-    // The fixed direction, and its cosine and sine with the normal.
+    // The fixed direction.
     fixed_direction: vec3f,
-    cosine: f32,
-    sine: f32,
-    // Unit, in the surface: the fixed direction's projection, and across it.
-    along: vec3f,
-    across: vec3f,
     alpha: f32,
-    // sqrt(alpha^2 + (1 - alpha^2) cos^2) of the fixed direction: its half of Smith's masking for GGX.
-    masking: f32,
-    // How much of the lobe is above the horizon.
-    above: f32,
     reflectance_normal: vec3f,
     reflectance_grazing: f32,
 }
@@ -75,6 +66,8 @@ struct SgReceiver {
     // The reflection lobe, and that of an SG distribution of normals.
     lobe: GlossyLobe,
     sg_lobe: AnisotropicSphericalGaussian,
+    // Sharpness of the round SG that is as broad as it.
+    strength: f32,
 }
 
 // Where a light is seen.
@@ -106,23 +99,11 @@ fn lobe_above(c: f32, alpha_squared: f32, inverse_sharpness: f32) -> f32 {
 }
 
 fn glossy_lobe(normal: vec3f, direction: vec3f, brdf: Brdf) -> GlossyLobe {
-    var lobe: GlossyLobe;
-    lobe.normal = normal;
-    lobe.fixed_direction = direction;
-    lobe.cosine = max(dot(normal, direction), 0.0);
-    let projected = direction - normal * dot(normal, direction);
-    let squared = dot(projected, projected);
-    lobe.sine = sqrt(min(squared, 1.0));
-    // What rounding has left of the normal in a short projection would be taken for a slope.
-    let straight = projected - normal * dot(normal, projected);
-    lobe.along = safe_normalize(select(perpendicular(normal), straight, squared > 1e-12), vec3f(1.0, 0.0, 0.0));
-    lobe.across = cross(normal, lobe.along);
-    lobe.alpha = brdf.alpha;
-    lobe.masking = sqrt(brdf.alpha * brdf.alpha + (1.0 - brdf.alpha * brdf.alpha) * lobe.cosine * lobe.cosine);
-    lobe.above = lobe_above(lobe.cosine, brdf.alpha * brdf.alpha, 0.0);
-    lobe.reflectance_normal = brdf.reflectance_normal;
-    lobe.reflectance_grazing = brdf.reflectance_grazing;
-    return lobe;
+    return GlossyLobe(normal, direction, brdf.alpha, brdf.reflectance_normal, brdf.reflectance_grazing);
+}
+
+fn fixed_cosine(lobe: GlossyLobe) -> f32 {
+    return max(dot(lobe.normal, lobe.fixed_direction), 0.0);
 }
 #endif
 
@@ -196,6 +177,7 @@ fn sg_receiver(position: vec3f, surface: Surface, brdf: Brdf, to_viewer: vec3f) 
 #endif
     receiver.sg_lobe = reflection_lobe_asg(ndf.sharpness, surface.normal, to_viewer);
     receiver.sg_lobe.amplitude = ndf.amplitude;
+    receiver.strength = 2.0 * sqrt(receiver.sg_lobe.eta_x * receiver.sg_lobe.eta_y);
     receiver.lobe = glossy_lobe(surface.normal, to_viewer, brdf);
 #endif
     return receiver;
@@ -230,29 +212,38 @@ fn view_disk(receiver: SgReceiver, light: SgLight) -> DiskView {
     let offset = light.position - receiver.position;
     let d = dot(offset, offset);
     let tilt = dot(light.normal, receiver.normal);
-    let above = max(dot(receiver.normal, offset), 0.0);
-    let square = min(light.radius * light.radius, 9.0 * above * above / max(1.0 - tilt * tilt, 1e-6));
+    let above = dot(receiver.normal, offset);
     // Height above the disk's plane, smoothed where its normals are spread.
-    let mean = -dot(light.normal, offset) * sqrt(max(1.0 - light.spread, 0.0));
-    let height = 0.5 * (mean + sqrt(mean * mean + 0.32 * light.spread * d));
+    var height = -dot(light.normal, offset);
+    if light.spread > 0.0 {
+        height = 0.5 * (height * sqrt(1.0 - light.spread) + sqrt(height * height * (1.0 - light.spread) + 0.32 * light.spread * d));
+    }
+    if !(above > 0.0 && height > 0.0) {
+        return DiskView(receiver.normal, 0.0, 0.0, 0.0);
+    }
+    var square = light.radius * light.radius;
+    let reach = 1.0 - tilt * tilt;
+    if square * reach > 9.0 * above * above {
+        square = 9.0 * above * above / reach;
+    }
     let difference = d - square;
     let q = max(sqrt(difference * difference + 4.0 * square * height * height), max(1e-9 * (d + square), 1e-36));
-    var parallel: f32;
-    if difference >= 0.0 {
-        parallel = (2.0 * height / q) * (height / (q + difference));
-    } else {
-        parallel = (q - difference) / (2.0 * q * square);
-    }
-    let radial = (2.0 * height / q) / (q + d + square);
+    // parallel = 2 height^2 / (q (q + difference)), which for a negative difference is (q - difference) / (2 q square); radial = 2 height / (q (q + d + square)).
+    let outside = difference >= 0.0;
+    let below = select(2.0 * square, q + difference, outside);
+    let inverse = 1.0 / q;
+    let parallel = select(q - difference, 2.0 * height * height, outside) * inverse / max(below, 1e-36);
+    let radial = 2.0 * height * inverse / (q + d + square);
     let vector = offset * radial - light.normal * (parallel - radial * height);
     let squared = dot(vector, vector);
     if !(squared > 1e-36) {
         return DiskView(receiver.normal, 0.0, 0.0, 0.0);
     }
-    let irradiance = sqrt(squared);
+    let inverse_length = inverseSqrt(squared);
+    let irradiance = squared * inverse_length;
     let sine_squared = min(square * irradiance, 1.0);
-    let rim = 1.0 + sqrt(1.0 - sine_squared);
-    return DiskView(vector / irradiance, irradiance, 2.0 * irradiance / rim, 0.5 * sine_squared / rim);
+    let inverse_rim = 1.0 / (1.0 + sqrt(1.0 - sine_squared));
+    return DiskView(vector * inverse_length, irradiance, 2.0 * irradiance * inverse_rim, 0.5 * sine_squared * inverse_rim);
 }
 
 // Whether a direction can be reflected to the viewer at all: with a normal map, both must be on one side of the geometric surface.
@@ -268,11 +259,9 @@ fn faces(receiver: SgReceiver, direction: vec3f) -> bool {
 // F G2 / (4 (n.v) (n.l)) for a cosine between normal and the free direction, and one between both directions.
 fn masking_and_fresnel(lobe: GlossyLobe, n_dot_l: f32, v_dot_l: f32) -> vec3f {
 #ifdef NDF_PHONG
-    let masking = phong_visibility(lobe.alpha, n_dot_l, max(lobe.cosine, 1e-4));
+    let masking = phong_visibility(lobe.alpha, n_dot_l, max(fixed_cosine(lobe), 1e-4));
 #else
-    let alpha_squared = lobe.alpha * lobe.alpha;
-    let other = sqrt(alpha_squared + (1.0 - alpha_squared) * n_dot_l * n_dot_l);
-    let masking = 0.5 / max(n_dot_l * lobe.masking + lobe.cosine * other, 1e-20);
+    let masking = ggx_visibility(lobe.alpha, n_dot_l, fixed_cosine(lobe));
 #endif
     // v.h = sqrt((1 + v.l) / 2).
     let v_dot_h = sqrt(clamp(0.5 + 0.5 * v_dot_l, 0.0, 1.0));
@@ -285,20 +274,30 @@ fn masking_and_fresnel(lobe: GlossyLobe, n_dot_l: f32, v_dot_l: f32) -> vec3f {
 fn filtered_ggx(lobe: GlossyLobe, axis: vec3f, inverse_sharpness: f32) -> f32 {
     let alpha_squared = lobe.alpha * lobe.alpha;
     let u = max((1.0 - lobe.alpha) * (1.0 + lobe.alpha), 0.0);
-    let c_squared = lobe.cosine * lobe.cosine;
+    let c = fixed_cosine(lobe);
+    let c_squared = c * c;
+    let s_squared = 1.0 - min(c_squared, 1.0);
     let wide = u * inverse_sharpness;
-    let along = alpha_squared + u * wide / (2.0 + wide);
-    let across = alpha_squared + u * wide / max(2.0 * c_squared + wide, 1e-6);
-    let h = safe_normalize(lobe.fixed_direction + axis, lobe.normal);
-    let x = dot(lobe.along, h);
-    let y = dot(lobe.across, h);
-    // 1 - x^2 - y^2 without the normal's rounding.
-    let bracket = x * x / along + y * y / across + max(1.0 - x * x - y * y, 0.0);
-    let s_squared = lobe.sine * lobe.sine;
+    // Squared alphas of the filtered distribution, alpha^2 + u wide / (2 + wide) along and alpha^2 + u wide / (2 c^2 + wide) across, with one division.
+    let along_below = 2.0 + wide;
+    let across_below = max(2.0 * c_squared + wide, 1e-6);
+    let inverse = 1.0 / (along_below * across_below);
+    let along = (alpha_squared * along_below + u * wide) * (across_below * inverse);
+    let across = (alpha_squared * across_below + u * wide) * (along_below * inverse);
+    let both = along * across;
+    let sum = lobe.fixed_direction + axis;
+    let h = sum * inverseSqrt(max(dot(sum, sum), 1e-12));
+    // h over the surface: across the plane of incidence, and along it. Looking down, both alphas are the same.
+    let slope = cross(lobe.normal, h);
+    let y = dot(lobe.fixed_direction, slope);
+    let slope_squared = min(dot(slope, slope), 1.0);
+    let y_squared = select(0.0, min(y * y / max(s_squared, 1e-4), slope_squared), s_squared > 1e-4);
+    // Times both alphas.
+    let bracket = (slope_squared - y_squared) * across + y_squared * along + (1.0 - slope_squared) * both;
     // What spreads below the horizon is lost to the reflection but not to the light: the power is a fit to the energy over all lights.
-    let kept = lobe.above / lobe_above(lobe.cosine, alpha_squared, inverse_sharpness);
-    let normalisation = kept * sqrt(kept * (alpha_squared * s_squared + c_squared) / (along * across * max(along * s_squared + c_squared, 1e-12)));
-    return INV_PI * normalisation / (bracket * bracket);
+    let kept = lobe_above(c, alpha_squared, 0.0) / lobe_above(c, alpha_squared, inverse_sharpness);
+    let normalisation = kept * sqrt(kept * (alpha_squared * s_squared + c_squared) * both / max(along * s_squared + c_squared, 1e-12));
+    return INV_PI * normalisation * both / max(bracket * bracket, 1e-36);
 }
 
 // Reflectance of a light's specular lobe towards the receiver, 1/sr, as it is over the cone in which the light is seen.
@@ -321,17 +320,17 @@ fn light_reflectance(light: SgLight, view: DiskView) -> vec3f {
 
 // How far the light's lobe draws the direction that its light comes from to its own axis, over how far the cone holds it: an SG's sharpness over the
 // cone's, less in the lobe's tail, where GGX falls off as a power and an SG would draw without bound.
-fn lobe_pull(light: SgLight, view: DiskView) -> f32 {
-    let off = light.axis + view.direction;
+fn lobe_pull(light: SgLight, axis: vec3f, view: DiskView) -> f32 {
+    let off = axis + view.direction;
     return light.sharpness * view.inverse_sharpness / (1.0 + 0.25 * light.sharpness * dot(off, off));
 }
 
 // Radiance that the glossy lobe reflects of an SG light that sends the irradiance 1 onto a surface facing it. What masks it is taken at about the largest
 // product of both lobes.
 fn glossy_fast(receiver: SgReceiver, axis: vec3f, inverse_sharpness: f32) -> vec3f {
-    let own = 2.0 * sqrt(receiver.sg_lobe.eta_x * receiver.sg_lobe.eta_y) * inverse_sharpness;
+    let own = receiver.strength * inverse_sharpness;
     let share = own / (1.0 + own);
-    let c = mix(dot(receiver.normal, axis), receiver.lobe.cosine, share);
+    let c = mix(dot(receiver.normal, axis), fixed_cosine(receiver.lobe), share);
     if !(c > 0.0) {
         return vec3f(0.0);
     }
@@ -359,10 +358,12 @@ fn vsgl_fast(receiver: SgReceiver, light: SgLight) -> vec3f {
     let shiny = light.flux * light_reflectance(light, view);
     let emitted = light.diffuse + shiny;
     // Both lobes of the light as one, whose axis the specular one pulls to itself by its share.
-    let pull = lobe_pull(light, view) * luminance(shiny) / max(luminance(emitted), 1e-30);
-    let p = view.direction - light.axis * pull;
-    let p_length = max(length(p), 1e-6);
-    let glossy = glossy_fast(receiver, p / p_length, view.inverse_sharpness / p_length);
+    // The lobe's axis, made again: what is not read from the light's record costs less.
+    let lobe_axis = reflection_axis(light.lobe.normal, light.lobe.fixed_direction);
+    let pull = lobe_pull(light, lobe_axis, view) * luminance(shiny) / max(luminance(emitted), 1e-30);
+    let p = view.direction - lobe_axis * pull;
+    let inverse_length = inverseSqrt(max(dot(p, p), 1e-12));
+    let glossy = glossy_fast(receiver, p * inverse_length, view.inverse_sharpness * inverse_length);
     return emitted * (receiver.diffuse * (view.irradiance * c) + glossy * view.solid_angle);
 #else
     return light.diffuse * receiver.diffuse * (view.irradiance * c);
@@ -374,8 +375,8 @@ fn glossy_accurate(receiver: SgReceiver, axis: vec3f, inverse_sharpness: f32) ->
     let alpha = receiver.lobe.alpha;
     let sharpness = 1.0 / max(inverse_sharpness, 1e-8);
 #ifdef NDF_PHONG
-    let own = 2.0 * sqrt(receiver.sg_lobe.eta_x * receiver.sg_lobe.eta_y) * inverse_sharpness;
-    let c = mix(dot(receiver.normal, axis), receiver.lobe.cosine, own / (1.0 + own));
+    let own = receiver.strength * inverse_sharpness;
+    let c = mix(dot(receiver.normal, axis), fixed_cosine(receiver.lobe), own / (1.0 + own));
     if !(c > 0.0) {
         return vec3f(0.0);
     }
@@ -405,7 +406,7 @@ fn vsgl_accurate(receiver: SgReceiver, light: SgLight) -> vec3f {
 #ifdef SPECULAR
     reflected += light.diffuse * glossy_accurate(receiver, view.direction, view.inverse_sharpness) * view.solid_angle;
     let shiny = light.flux * light_reflectance(light, view) * view.solid_angle;
-    let p = view.direction - light.axis * lobe_pull(light, view);
+    let p = view.direction - light.axis * lobe_pull(light, light.axis, view);
     let p_length = max(length(p), 1e-6);
     let axis = p / p_length;
     let inverse_sharpness = view.inverse_sharpness / p_length;
@@ -467,8 +468,8 @@ fn vsgl_printed(receiver: SgReceiver, light: SgLight) -> vec3f {
     let eta = vec2f(receiver.sg_lobe.eta_x, receiver.sg_lobe.eta_y);
     let glossy = light.diffuse * (view.light_cosine * vsgl_kernel_fast(eta, local, 0.0, local, view.distance, light.radius))
         + light.specular * (view.above * vsgl_kernel_fast(eta, lobe_local, light.sharpness, local, view.distance, light.radius));
-    let own = 2.0 * sqrt(receiver.sg_lobe.eta_x * receiver.sg_lobe.eta_y) * light.radius * light.radius / s;
-    let dominant = mix(c, receiver.lobe.cosine, own / (1.0 + own));
+    let own = receiver.strength * light.radius * light.radius / s;
+    let dominant = mix(c, fixed_cosine(receiver.lobe), own / (1.0 + own));
     let shading = masking_and_fresnel(receiver.lobe, dominant, dot(receiver.lobe.fixed_direction, view.direction)) * dominant;
     return reflected + glossy * receiver.sg_lobe.amplitude * shading;
 #else
