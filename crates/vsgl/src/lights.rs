@@ -41,12 +41,14 @@ pub struct VsglLightsParams {
     /// Number of lights N. More lights are smaller: less blur and linearly more time.
     #[param(unit = "lights", range = 1..=65536)]
     pub count: u32,
-    /// How many lights' patches cover each place, k. More: smoother; less: sharper, with more noise.
+    /// How many lights' patches cover each place, k. More: smoother; less: sharper, with more noise. The 2014 brief's 4 is that of its bilinear filter's block; the
+    /// whole filter is three times as wide, and this counts all of it.
     #[param(unit = "lights", range = 0.0625..=256.0)]
     pub overlap: f32,
     /// How a patch's size follows from the density.
     pub kernel: Kernel,
-    /// A patch grows no further where its variance would exceed this many times that of a flat one of its size, as it does across an edge; `none` lets it.
+    /// Blocks of texels whose positions or normals vary more than this many times as much as those of a flat (or evenly curved) surface, as they do across an
+    /// edge, do not count in a patch: it stays on its own surface. `none` lets it grow across.
     #[param(range = 1.0..)]
     pub edges: OrNone<f32>,
     /// Least radius of a light, in units of that of a flat patch of its share: among leaves and folds patches find no room to grow, and would be points.
@@ -61,7 +63,7 @@ pub struct VsglLightsParams {
 
 impl Default for VsglLightsParams {
     fn default() -> Self {
-        Self { count: 1024, overlap: 4.0, kernel: Kernel::Mean, edges: OrNone::Value(3.0), least_radius: 0.7, shrink: false, seed: 0 }
+        Self { count: 1024, overlap: 1.0, kernel: Kernel::Mean, edges: OrNone::Value(3.0), least_radius: 1.0, shrink: false, seed: 0 }
     }
 }
 
