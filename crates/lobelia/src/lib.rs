@@ -14,6 +14,7 @@
 //! # Ok(()) }
 //! ```
 
+pub use lobelia_aism as aism;
 pub use lobelia_compose as compose;
 pub use lobelia_direct as direct;
 pub use lobelia_frame as frame;
@@ -48,6 +49,7 @@ pub fn registry() -> Registry<SceneWorld> {
     lobelia_direct::register(&mut registry);
     lobelia_vpl::register(&mut registry);
     lobelia_visibility::register(&mut registry);
+    lobelia_aism::register(&mut registry);
     lobelia_compose::register(&mut registry);
     registry
 }
