@@ -46,6 +46,10 @@ struct Range {
 #endif
 @group(0) @binding(7) var<storage, read_write> visibility: array<u32>;
 
+// As in `maps.wgsl`.
+const REFERENCE: u32 = 0x80000000u;
+const EMPTY: u32 = 0xffffffffu;
+
 struct SharedLight {
     position: vec3f,
     normal: vec3f,
@@ -65,7 +69,7 @@ fn receiver_normal(pixel: vec2u) -> vec3f {
 }
 
 // Farther than this many texel widths beyond the receiver itself, its plane is not followed: a plane seen at grazing angles runs to the horizon.
-const MOST_SLOPE: f32 = 4.0;
+const MOST_SLOPE: f32 = 0.0;
 
 // Whether what a light's map knows leaves the receiver (in the light's frame) lit.
 fn lit(slot: u32, receiver: vec3f, receiver_side: vec3f) -> bool {
@@ -85,12 +89,22 @@ fn lit(slot: u32, receiver: vec3f, receiver_side: vec3f) -> bool {
     let place = (hemi_octahedral_encode(start) * 0.5 + vec2f(0.5)) * side - vec2f(0.5);
     let low = floor(place);
     let share = place - low;
-    let stride = (4u * settings.resolution * settings.resolution - 1u) / 3u;
+    let start_of_map = slot * ((4u * settings.resolution * settings.resolution - 1u) / 3u);
     var seen = 0.0;
     for (var corner = 0u; corner < 4u; corner++) {
         let step = vec2f(f32(corner & 1u), f32(corner >> 1u));
-        let texel = clamp(low + step, vec2f(0.0), vec2f(side - 1.0));
         let shares = select(vec2f(1.0) - share, share, step > vec2f(0.5));
+        var texel = clamp(low + step, vec2f(0.0), vec2f(side - 1.0));
+        var word = maps[start_of_map + u32(texel.y) * settings.resolution + u32(texel.x)];
+        if word == EMPTY {
+            seen += shares.x * shares.y;
+            continue;
+        }
+        if word >= REFERENCE {
+            let other = vec2u(word & 255u, (word >> 8u) & 255u);
+            texel = vec2f(other);
+            word = maps[start_of_map + other.y * settings.resolution + other.x];
+        }
         // Where the ray through the texel's centre meets the receiver's plane.
         let ray = hemi_octahedral_decode((texel + vec2f(0.5)) * (2.0 / side) - vec2f(1.0));
         let slope = dot(receiver_side, ray);
@@ -99,8 +113,7 @@ fn lit(slot: u32, receiver: vec3f, receiver_side: vec3f) -> bool {
         if slope < 0.0 && height < 0.0 {
             along = min(height / slope, farthest);
         }
-        let stored = bitcast<f32>(maps[slot * stride + u32(texel.y) * settings.resolution + u32(texel.x)]);
-        if stored >= along {
+        if bitcast<f32>(word) >= along {
             seen += shares.x * shares.y;
         }
     }

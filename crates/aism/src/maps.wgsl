@@ -1,6 +1,6 @@
 // Draws imperfect shadow maps: chooses points on the scene's surface for each light, splats them, and closes holes.
 //
-// A light's map is a pyramid of square levels, finest first, of distances as the bits of floats; infinity stands for "nothing here".
+// A light's map is a pyramid of square levels, finest first.
 
 #import lobelia::hemi_octahedral::{hemi_octahedral_decode, hemi_octahedral_encode, hemi_octahedral_norm}
 #import lobelia::math::{PI, perpendicular, safe_normalize}
@@ -66,7 +66,10 @@ struct Level {
 @group(0) @binding(10) var gbuffer_core: texture_2d<u32>;
 #endif
 
-const INFINITY_BITS: u32 = 0x7f800000u;
+// Texels are distances (in the norm of the map) as the bits of floats, references to another texel of the finest level, or empty, which comes last in
+// order, so that the least of several is kept.
+const REFERENCE: u32 = 0x80000000u;
+const EMPTY: u32 = 0xffffffffu;
 
 // Largest radius of a splat, texels; wider gaps are left to pulling and pushing.
 const MAX_RADIUS: f32 = 4.0;
@@ -146,7 +149,7 @@ fn level_start(slot: u32, index: u32) -> u32 {
 @compute @workgroup_size(256)
 fn clear(@builtin(global_invocation_id) id: vec3u) {
     if id.x < map_stride() && range.first_light + id.y < range.end_light {
-        atomicStore(&maps[id.y * map_stride() + id.x], INFINITY_BITS);
+        atomicStore(&maps[id.y * map_stride() + id.x], EMPTY);
     }
 }
 
@@ -344,23 +347,26 @@ fn splat(@builtin(global_invocation_id) id: vec3u) {
     }
 }
 
-// Distances count as those of one surface if they differ by less than this share.
-const SAME_SURFACE: f32 = 0.25;
-
-fn texel_distance(start: u32, side: u32, place: vec2u) -> f32 {
-    return bitcast<f32>(atomicLoad(&maps[start + place.y * side + place.x]));
-}
-
-// Weighted mean of the reciprocals of those distances that belong to the nearest surface, as a distance; infinity without any.
-fn nearest_surface(distances: vec4f, shares: vec4f) -> f32 {
-    let nearest = min(min(distances.x, distances.y), min(distances.z, distances.w));
-    if !(nearest < 1e30) {
-        return bitcast<f32>(INFINITY_BITS);
+// The texel of the finest level that a texel of any level stands for: itself, or the one that it refers to; none: EMPTY.
+fn referred(slot: u32, index: u32, place: vec2u) -> u32 {
+    let word = atomicLoad(&maps[level_start(slot, index) + place.y * (settings.resolution >> index) + place.x]);
+    if index == 0u && word < REFERENCE {
+        return REFERENCE | (place.y << 8u) | place.x;
     }
-    let used = select(vec4f(0.0), shares, distances <= vec4f(nearest * (1.0 + SAME_SURFACE)));
-    return dot(used, vec4f(1.0)) / dot(used, vec4f(1.0) / distances);
+    return word;
 }
 
+// The nearer of two texels, measured in texels of the finest level from a place; the first one if they are equally near.
+fn nearer(one: u32, other: u32, place: vec2f) -> u32 {
+    if one == EMPTY || other == EMPTY {
+        return min(one, other);
+    }
+    let from_one = vec2f(f32(one & 255u), f32((one >> 8u) & 255u)) + vec2f(0.5) - place;
+    let from_other = vec2f(f32(other & 255u), f32((other >> 8u) & 255u)) + vec2f(0.5) - place;
+    return select(one, other, dot(from_other, from_other) < dot(from_one, from_one));
+}
+
+// Each coarser texel refers to the texel nearest to its middle.
 @compute @workgroup_size(256)
 fn pull(@builtin(global_invocation_id) id: vec3u) {
     let side = settings.resolution >> (level.index + 1u);
@@ -368,16 +374,15 @@ fn pull(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let place = vec2u(id.x % side, id.x / side);
-    let fine = level_start(id.y, level.index);
-    let distances = vec4f(
-        texel_distance(fine, 2u * side, 2u * place),
-        texel_distance(fine, 2u * side, 2u * place + vec2u(1u, 0u)),
-        texel_distance(fine, 2u * side, 2u * place + vec2u(0u, 1u)),
-        texel_distance(fine, 2u * side, 2u * place + vec2u(1u, 1u)),
-    );
-    atomicStore(&maps[level_start(id.y, level.index + 1u) + id.x], bitcast<u32>(nearest_surface(distances, vec4f(1.0))));
+    let middle = (vec2f(place) + vec2f(0.5)) * f32(2u << level.index);
+    var best = EMPTY;
+    for (var child = 0u; child < 4u; child++) {
+        best = nearer(best, referred(id.y, level.index, 2u * place + vec2u(child & 1u, child >> 1u)), middle);
+    }
+    atomicStore(&maps[level_start(id.y, level.index + 1u) + id.x], best);
 }
 
+// Each empty texel refers to the nearest that the coarser texels around it refer to.
 @compute @workgroup_size(256)
 fn push(@builtin(global_invocation_id) id: vec3u) {
     let side = settings.resolution >> level.index;
@@ -386,20 +391,18 @@ fn push(@builtin(global_invocation_id) id: vec3u) {
     }
     let place = vec2u(id.x % side, id.x / side);
     let own = level_start(id.y, level.index) + id.x;
-    if atomicLoad(&maps[own]) != INFINITY_BITS {
+    if atomicLoad(&maps[own]) != EMPTY {
         return;
     }
-    // The four coarse texels around; beyond the border the nearest within.
-    let coarse = level_start(id.y, level.index + 1u);
-    let half = side / 2u;
+    // The four coarse texels around, within the border.
     let near = place / 2u;
     let step = vec2i(place & vec2u(1u)) * 2 - vec2i(1);
-    let far = vec2u(clamp(vec2i(near) + step, vec2i(0), vec2i(i32(half) - 1)));
-    let distances = vec4f(
-        texel_distance(coarse, half, near),
-        texel_distance(coarse, half, vec2u(far.x, near.y)),
-        texel_distance(coarse, half, vec2u(near.x, far.y)),
-        texel_distance(coarse, half, far),
-    );
-    atomicStore(&maps[own], bitcast<u32>(nearest_surface(distances, vec4f(9.0, 3.0, 3.0, 1.0))));
+    let far = vec2u(clamp(vec2i(near) + step, vec2i(0), vec2i(i32(side / 2u) - 1)));
+    let middle = (vec2f(place) + vec2f(0.5)) * f32(1u << level.index);
+    var best = EMPTY;
+    for (var corner = 0u; corner < 4u; corner++) {
+        let coarse = select(near, far, vec2<bool>((corner & 1u) == 1u, corner > 1u));
+        best = nearer(best, referred(id.y, level.index + 1u, coarse), middle);
+    }
+    atomicStore(&maps[own], best);
 }
