@@ -85,6 +85,12 @@ struct Point {
     // Relative to the light, in its frame.
     position: vec3f,
     normal: vec3f,
+    // Barycentric coordinates of the second and the third corner, and their gradients over the triangle's plane.
+    weights: vec2f,
+    gradient_b: vec3f,
+    gradient_c: vec3f,
+    // Of the triangle, m^2.
+    area: f32,
 }
 
 struct Frame {
@@ -132,8 +138,17 @@ fn surface_point(place: u32, frame: Frame) -> Point {
     let ac = triangles[3u * low + 2u].xyz;
     let mean = (1.0 - moved.x - moved.y - moved.z) / 3.0;
     let position = triangles[3u * low].xyz + ab * (moved.y + mean) + ac * (moved.z + mean);
-    let normal = safe_normalize(cross(safe_normalize(ab, vec3f(0.0)), safe_normalize(ac, vec3f(0.0))), vec3f(0.0));
-    return Point(to_frame(frame, position - frame.origin), to_frame(frame, normal));
+    let local_ab = to_frame(frame, ab);
+    let local_ac = to_frame(frame, ac);
+    // Edges are scaled before they are multiplied, so that neither tiny nor huge triangles leave the range of floats.
+    let scale = max(max(length(ab), length(ac)), 1e-30);
+    let twice_area = cross(local_ab / scale, local_ac / scale);
+    let sine = max(length(twice_area), 1e-30);
+    let normal = twice_area / sine;
+    let gradient_b = cross(local_ac / scale, normal) / (sine * scale);
+    let gradient_c = cross(normal, local_ab / scale) / (sine * scale);
+    let weights = vec2f(moved.y + mean, moved.z + mean);
+    return Point(to_frame(frame, position - frame.origin), normal, weights, gradient_b, gradient_c, 0.5 * sine * scale * scale);
 }
 
 fn map_stride() -> u32 {
@@ -335,12 +350,16 @@ fn splat(@builtin(global_invocation_id) id: vec3u) {
     let high = vec2u(clamp(floor(centre + vec2f(reach - 0.5)), vec2f(0.0), vec2f(side - 1.0)));
     let height = dot(point.normal, point.position);
     let start = level_start(id.y, 0u);
+    // A disk ends where its triangle does, or shadows would grow by its radius. Where triangles are as small as disks, their neighbours are met as well.
+    let overhang = 0.25 * PI * radius * radius / point.area;
     for (var y = low.y; y <= high.y; y++) {
         for (var x = low.x; x <= high.x; x++) {
             let texel = hemi_octahedral_decode((vec2f(f32(x), f32(y)) + vec2f(0.5)) * (2.0 / side) - vec2f(1.0));
             let along = height / dot(point.normal, texel);
             let offset = along * texel - point.position;
-            if along > 0.0 && dot(offset, offset) <= radius * radius {
+            let weights = point.weights + vec2f(dot(offset, point.gradient_b), dot(offset, point.gradient_c));
+            let inside = min(min(weights.x, weights.y), 1.0 - weights.x - weights.y) >= -overhang;
+            if along > 0.0 && dot(offset, offset) <= radius * radius && inside {
                 atomicMin(&maps[start + y * settings.resolution + x], bitcast<u32>(along));
             }
         }
