@@ -72,7 +72,7 @@ pub struct Params {
     pub sampling: Sampling,
     /// Patches of equal area that each light weighs before points are chosen (adaptive sampling); rounded up to a multiple of 256. A patch should not
     /// be larger than what a light can see as one: more for scenes with much surface. Time grows linearly.
-    #[param(unit = "patches", range = 256..=16384)]
+    #[param(unit = "patches", range = 256..=65536)]
     pub candidates: u32,
     /// Pixels that each light looks at to learn where receivers are (adaptive sampling). Patches with no receiver behind them get a fiftieth of the
     /// points. 0 does not look: points then fill the whole map evenly, and do not depend on the camera.
@@ -102,11 +102,11 @@ impl Default for Params {
             points: 8192,
             resolution: 64,
             sampling: Sampling::Adaptive,
-            candidates: 2048,
+            candidates: 8192,
             view_samples: 1024,
-            spread: 1.3,
+            spread: 1.25,
             pull_push: true,
-            bias: 0.3,
+            bias: 0.5,
             interleave: 1,
             seed: 0,
         }

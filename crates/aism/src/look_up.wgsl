@@ -68,6 +68,10 @@ fn receiver_normal(pixel: vec2u) -> vec3f {
 #endif
 }
 
+// A texel that is borrowed from elsewhere must be nearer than the receiver by this for each radian in between to hide it: surfaces that meet at an angle would
+// shade each other.
+const REFERENCE_SLOPE: f32 = 4.0;
+
 // Farther than this many texel widths beyond the receiver itself, its plane is not followed: a plane seen at grazing angles runs to the horizon.
 const MOST_SLOPE: f32 = 0.0;
 
@@ -100,8 +104,10 @@ fn lit(slot: u32, receiver: vec3f, receiver_side: vec3f) -> bool {
             seen += shares.x * shares.y;
             continue;
         }
+        var tolerance = 0.0;
         if word >= REFERENCE {
             let other = vec2u(word & 255u, (word >> 8u) & 255u);
+            tolerance = REFERENCE_SLOPE * texel_width * length(vec2f(other) - texel);
             texel = vec2f(other);
             word = maps[start_of_map + other.y * settings.resolution + other.x];
         }
@@ -113,7 +119,7 @@ fn lit(slot: u32, receiver: vec3f, receiver_side: vec3f) -> bool {
         if slope < 0.0 && height < 0.0 {
             along = min(height / slope, farthest);
         }
-        if bitcast<f32>(word) >= along {
+        if bitcast<f32>(word) >= along * (1.0 - tolerance) {
             seen += shares.x * shares.y;
         }
     }

@@ -72,7 +72,7 @@ const REFERENCE: u32 = 0x80000000u;
 const EMPTY: u32 = 0xffffffffu;
 
 // Largest radius of a splat, texels; wider gaps are left to pulling and pushing.
-const MAX_RADIUS: f32 = 4.0;
+const MAX_RADIUS: f32 = 3.0;
 
 // A splat reaches every texel whose centre is this near, texels: about the texel that it falls into.
 const MIN_RADIUS: f32 = 0.5;
@@ -171,7 +171,7 @@ fn clear(@builtin(global_invocation_id) id: vec3u) {
 // Cells of the map in which receivers are looked for, a side.
 const VIEW_CELLS: u32 = 16u;
 // Weight of patches behind which no receiver was found, relative to others: samples of the view miss some.
-const UNSEEN_WEIGHT: f32 = 0.02;
+const UNSEEN_WEIGHT: f32 = 0.1;
 
 // Distance (in the map's norm) of the farthest receiver in each cell.
 var<workgroup> farthest: array<atomic<u32>, 256>;
