@@ -71,3 +71,37 @@ impl SurfaceCurve {
         self.ends.is_empty()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    fn triangle(size: f32, at: f32) -> Triangle {
+        let start = Vec3::new(at, 0.0, 0.0);
+        Triangle { positions: [start, start + Vec3::X * size, start + Vec3::Y * size], instance: 0, material: 0 }
+    }
+
+    #[test]
+    fn intervals_are_in_proportion_to_areas() {
+        let curve = SurfaceCurve::new(&[triangle(2.0, 0.0), triangle(0.0, 1.0), triangle(1.0, 50.0), triangle(f32::NAN, 3.0)]);
+        assert_eq!((curve.len(), curve.triangles.len(), curve.area), (2, 6, 2.5));
+        assert_eq!(curve.ends, [3_435_973_836, u32::MAX]);
+        let tiny = SurfaceCurve::new(&[triangle(1e-6, 0.0), triangle(1e-6, 1e-6)]);
+        assert_eq!(tiny.ends, [1 << 31, u32::MAX], "small scenes are no different");
+        let mixed = SurfaceCurve::new(&[triangle(1e-6, 0.0), triangle(1e4, 0.0), triangle(1e-6, 1e4)]);
+        assert!(mixed.ends.is_sorted() && mixed.ends.last() == Some(&u32::MAX), "{:?}", mixed.ends);
+    }
+
+    #[test]
+    fn what_is_near_on_the_curve_is_near_in_space() {
+        let triangles: Vec<_> = (0..512u32).map(|index| triangle(0.01, (index.wrapping_mul(269) % 512) as f32)).collect();
+        let curve = SurfaceCurve::new(&triangles);
+        assert!(curve.triangles.chunks(3).map(|rows| rows[0][0]).is_sorted(), "along an axis, the curve runs along it");
+    }
+
+    #[test]
+    fn no_surface_is_an_empty_curve() {
+        assert!(SurfaceCurve::new(&[]).is_empty() && SurfaceCurve::new(&[triangle(0.0, 1.0)]).is_empty());
+    }
+}
