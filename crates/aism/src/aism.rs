@@ -16,6 +16,7 @@ pub struct AismPass {
     clear: ComputePipeline,
     weigh: ComputePipeline,
     splat: ComputePipeline,
+    mark_gaps: ComputePipeline,
     pull: ComputePipeline,
     push: ComputePipeline,
     look_up: ComputePipeline,
@@ -134,6 +135,7 @@ pub struct Bindings {
     clear: wgpu::BindGroup,
     weigh: wgpu::BindGroup,
     splat: wgpu::BindGroup,
+    mark_gaps: wgpu::BindGroup,
     pull: Vec<wgpu::BindGroup>,
     push: Vec<wgpu::BindGroup>,
     look_up: Vec<wgpu::BindGroup>,
@@ -249,6 +251,7 @@ impl Pass for AismPass {
             clear: pipeline(maps, "clear")?,
             weigh: pipeline(maps, "weigh")?,
             splat: pipeline(maps, "splat")?,
+            mark_gaps: pipeline(maps, "mark_gaps")?,
             pull: pipeline(maps, "pull")?,
             push: pipeline(maps, "push")?,
             look_up: pipeline(look_up, "look_up")?,
@@ -310,6 +313,7 @@ impl Pass for AismPass {
             clear: group(&self.clear, &self.levels[0])?,
             weigh: group(&self.weigh, &self.levels[0])?,
             splat: group(&self.splat, &self.levels[0])?,
+            mark_gaps: group(&self.mark_gaps, &self.levels[0])?,
             pull: each_level(&self.pull)?,
             push: each_level(&self.push)?,
             look_up: outputs.visibility.chunks.iter().map(look_up).collect::<Result<_, _>>()?,
@@ -376,6 +380,7 @@ impl AismPass {
         }
         if self.params.pull_push {
             let texels = |level: usize| (self.params.resolution >> level).pow(2);
+            run(frame, "mark gaps", &self.mark_gaps, &bindings.mark_gaps, [texels(0).div_ceil(256), count, 1]);
             for (level, group) in bindings.pull.iter().enumerate() {
                 run(frame, "pull", &self.pull, group, [texels(level + 1).div_ceil(256), count, 1]);
             }

@@ -70,6 +70,8 @@ struct Level {
 // order, so that the least of several is kept.
 const REFERENCE: u32 = 0x80000000u;
 const EMPTY: u32 = 0xffffffffu;
+// Of a distance: its last bit tells that it is not to be trusted.
+const GAP: u32 = 1u;
 
 // Largest radius of a splat, texels; wider gaps are left to pulling and pushing.
 const MAX_RADIUS: f32 = 3.0;
@@ -360,9 +362,49 @@ fn splat(@builtin(global_invocation_id) id: vec3u) {
             let weights = point.weights + vec2f(dot(offset, point.gradient_b), dot(offset, point.gradient_c));
             let inside = min(min(weights.x, weights.y), 1.0 - weights.x - weights.y) >= -overhang;
             if along > 0.0 && dot(offset, offset) <= radius * radius && inside {
-                atomicMin(&maps[start + y * settings.resolution + x], bitcast<u32>(along));
+                atomicMin(&maps[start + y * settings.resolution + x], bitcast<u32>(along) & ~GAP);
             }
         }
+    }
+}
+
+// What is behind both of two texels that face each other, by this factor, is background between them.
+const GAP_DEPTH: f32 = 1.25;
+
+// Distance in a texel beside another; infinity where there is none.
+fn beside(slot: u32, place: vec2u, step: vec2i) -> f32 {
+    let other = vec2i(place) + step;
+    if any(other < vec2i(0)) || any(other >= vec2i(i32(settings.resolution))) {
+        return 1e30;
+    }
+    let word = atomicLoad(&maps[level_start(slot, 0u) + u32(other.y) * settings.resolution + u32(other.x)]);
+    return select(bitcast<f32>(word & ~GAP), 1e30, word >= REFERENCE);
+}
+
+// Marks texels that see background through a gap between points: three of the four pairs of neighbours that face each other are clearly nearer. Along
+// a plane, however slanted, no pair is.
+@compute @workgroup_size(256)
+fn mark_gaps(@builtin(global_invocation_id) id: vec3u) {
+    let side = settings.resolution;
+    if id.x >= side * side || range.first_light + id.y >= range.end_light {
+        return;
+    }
+    let own = level_start(id.y, 0u) + id.x;
+    let word = atomicLoad(&maps[own]);
+    if word >= REFERENCE {
+        return;
+    }
+    let place = vec2u(id.x % side, id.x / side);
+    let nearer_than = bitcast<f32>(word) / GAP_DEPTH;
+    var pairs = 0u;
+    for (var direction = 0; direction < 4; direction++) {
+        let step = vec2i(min(direction, 1), select(direction - 2, 1, direction == 0));
+        if max(beside(id.y, place, step), beside(id.y, place, -step)) < nearer_than {
+            pairs += 1u;
+        }
+    }
+    if pairs >= 3u {
+        atomicStore(&maps[own], word | GAP);
     }
 }
 
@@ -370,6 +412,9 @@ fn splat(@builtin(global_invocation_id) id: vec3u) {
 fn referred(slot: u32, index: u32, place: vec2u) -> u32 {
     let word = atomicLoad(&maps[level_start(slot, index) + place.y * (settings.resolution >> index) + place.x]);
     if index == 0u && word < REFERENCE {
+        if (word & GAP) != 0u {
+            return EMPTY;
+        }
         return REFERENCE | (place.y << 8u) | place.x;
     }
     return word;
@@ -410,7 +455,8 @@ fn push(@builtin(global_invocation_id) id: vec3u) {
     }
     let place = vec2u(id.x % side, id.x / side);
     let own = level_start(id.y, level.index) + id.x;
-    if atomicLoad(&maps[own]) != EMPTY {
+    let word = atomicLoad(&maps[own]);
+    if word != EMPTY && (level.index > 0u || (word & GAP) == 0u) {
         return;
     }
     // The four coarse texels around, within the border.
@@ -423,5 +469,5 @@ fn push(@builtin(global_invocation_id) id: vec3u) {
         let coarse = select(near, far, vec2<bool>((corner & 1u) == 1u, corner > 1u));
         best = nearer(best, referred(id.y, level.index + 1u, coarse), middle);
     }
-    atomicStore(&maps[own], best);
+    atomicStore(&maps[own], select(best, word, best == EMPTY));
 }
