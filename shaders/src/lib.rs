@@ -36,6 +36,7 @@ pub fn modules() -> &'static [Source<'static>] {
     modules![
         "math",
         "octahedral",
+        "hemi_octahedral",
         "sg",
         "sg_cosine",
         "asg",

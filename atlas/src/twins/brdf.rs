@@ -24,6 +24,12 @@ fn cosines(index: u32) -> Row {
     row([[draw.log_between(1e-3, 1.0), l, v, 0.0], [0.0; 4], [0.0; 4], [0.0; 4]])
 }
 
+/// A direction above the horizon in `a`.
+fn upper_direction(index: u32) -> Row {
+    let direction = Draw::new(index, 104).direction();
+    row([group(direction.with_z(direction.z.abs()), 0.0), [0.0; 4], [0.0; 4], [0.0; 4]])
+}
+
 /// What rounding leaves of sin^2 of the angle between two directions: the parts of the cross product are off by their last places.
 fn sine_error(row: &[f64; 16]) -> f64 {
     4e-7 * direction_of(row, 0).cross(direction_of(row, 1)).length() + 2e-13
@@ -158,6 +164,35 @@ fn value(input: Input) -> vec4f { return vec4f(octahedral_decode(input.a.xy), 0.
                 row([[draw.between(-1.0, 1.0), draw.between(-1.0, 1.0), 0.0, 0.0], [0.0; 4], [0.0; 4], [0.0; 4]])
             },
             expected: |row| octahedral_decode(DVec2::new(row[0], row[1])).to_array().map(|part| Expected::absolute(part, 5e-7)).to_vec(),
+        },
+        Twin {
+            name: "hemi_octahedral::hemi_octahedral_norm",
+            wgsl: "#import lobelia::hemi_octahedral::hemi_octahedral_norm
+fn value(input: Input) -> vec4f { return vec4f(hemi_octahedral_norm(input.a.xyz)); }",
+            domain: "directions with z >= 0",
+            input: upper_direction,
+            expected: |row| vec![Expected::relative(hemi_octahedral_norm(direction_of(row, 0)), 5e-7)],
+        },
+        Twin {
+            name: "hemi_octahedral::hemi_octahedral_encode",
+            wgsl: "#import lobelia::hemi_octahedral::hemi_octahedral_encode
+fn value(input: Input) -> vec4f { return vec4f(hemi_octahedral_encode(input.a.xyz), 0.0, 0.0); }",
+            domain: "directions with z >= 0",
+            input: upper_direction,
+            expected: |row| hemi_octahedral_encode(direction_of(row, 0)).to_array().map(|part| Expected::absolute(part, 1e-6)).to_vec(),
+        },
+        Twin {
+            name: "hemi_octahedral::hemi_octahedral_decode",
+            wgsl: "#import lobelia::hemi_octahedral::hemi_octahedral_decode
+fn value(input: Input) -> vec4f { return vec4f(hemi_octahedral_decode(input.a.xy), 0.0); }",
+            domain: "[-1, 1]^2",
+            input: |index| {
+                let mut draw = Draw::new(index, 105);
+                row([[draw.between(-1.0, 1.0), draw.between(-1.0, 1.0), 0.0, 0.0], [0.0; 4], [0.0; 4], [0.0; 4]])
+            },
+            expected: |row| {
+                hemi_octahedral_decode(DVec2::new(row[0], row[1])).to_array().map(|part| Expected::absolute(part, 5e-7)).to_vec()
+            },
         },
     ]
 }

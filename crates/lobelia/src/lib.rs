@@ -15,6 +15,7 @@
 //! ```
 
 pub use lobelia_brsm as brsm;
+pub use lobelia_aism as aism;
 pub use lobelia_compose as compose;
 pub use lobelia_direct as direct;
 pub use lobelia_frame as frame;
@@ -55,6 +56,7 @@ pub fn registry() -> Registry<SceneWorld> {
     lobelia_vsgl::register(&mut registry);
     lobelia_vsl::register(&mut registry);
     lobelia_visibility::register(&mut registry);
+    lobelia_aism::register(&mut registry);
     lobelia_compose::register(&mut registry);
     lobelia_progressive::register(&mut registry);
     registry
