@@ -159,7 +159,13 @@ fn sg_light_of_point(point: VirtualLight) -> SgLight {
     lobes.lobe_axis = octahedral_pack(reflected.axis);
     lobes.lobe_sharpness = min(reflected.sharpness, 1e8);
 #endif
-    return sg_light_of_lobes(lobes, point);
+    var light = sg_light_of_lobes(lobes, point);
+#ifdef SPECULAR
+    // Not by way of the packed axis: half of its error would be the normal's.
+    light.axis = reflected.axis;
+    light.lobe.normal = surface.normal;
+#endif
+    return light;
 }
 
 fn sg_receiver(position: vec3f, surface: Surface, brdf: Brdf, to_viewer: vec3f) -> SgReceiver {
@@ -356,15 +362,17 @@ fn vsgl_fast(receiver: SgReceiver, light: SgLight) -> vec3f {
     }
 #ifdef SPECULAR
     let shiny = light.flux * light_reflectance(light, view);
-    let emitted = light.diffuse + shiny;
+    // Bounded, so that times nothing it is nothing.
+    let emitted = min(light.diffuse + shiny, vec3f(1e28));
     // Both lobes of the light as one, whose axis the specular one pulls to itself by its share.
     // The lobe's axis, made again: what is not read from the light's record costs less.
     let lobe_axis = reflection_axis(light.lobe.normal, light.lobe.fixed_direction);
     let pull = lobe_pull(light, lobe_axis, view) * luminance(shiny) / max(luminance(emitted), 1e-30);
     let p = view.direction - lobe_axis * pull;
     let inverse_length = inverseSqrt(max(dot(p, p), 1e-12));
-    let glossy = glossy_fast(receiver, p * inverse_length, view.inverse_sharpness * inverse_length);
-    return emitted * (receiver.diffuse * (view.irradiance * c) + glossy * view.solid_angle);
+    let axis = p * inverse_length;
+    let glossy = glossy_fast(receiver, axis, view.inverse_sharpness * inverse_length);
+    return emitted * (receiver.diffuse * (view.irradiance * max(dot(receiver.normal, axis), 0.0)) + glossy * view.solid_angle);
 #else
     return light.diffuse * receiver.diffuse * (view.irradiance * c);
 #endif
@@ -405,7 +413,7 @@ fn vsgl_accurate(receiver: SgReceiver, light: SgLight) -> vec3f {
     var reflected = light.diffuse * receiver.diffuse * (view.irradiance * max(c, 0.0));
 #ifdef SPECULAR
     reflected += light.diffuse * glossy_accurate(receiver, view.direction, view.inverse_sharpness) * view.solid_angle;
-    let shiny = light.flux * light_reflectance(light, view) * view.solid_angle;
+    let shiny = min(light.flux * light_reflectance(light, view) * view.solid_angle, vec3f(1e28));
     let p = view.direction - light.axis * lobe_pull(light, light.axis, view);
     let p_length = max(length(p), 1e-6);
     let axis = p / p_length;
@@ -428,7 +436,7 @@ fn gaussian_lobe(receiver: SgReceiver, flux: vec3f, lobe_axis: vec3f, lobe_sharp
 #ifdef SPECULAR
     reflected += glossy_fast(receiver, product.axis, 1.0 / max(product.sharpness, 1e-3)) * sg_integral(product.sharpness);
 #endif
-    return amplitude * reflected;
+    return min(amplitude, vec3f(1e28)) * reflected;
 }
 
 // A Gaussian cloud of positions, whose intensity is two SGs (Tokuyoshi 2015; 2024): nothing in it has an edge, so it is the form for lights as large as what
@@ -458,7 +466,7 @@ fn vsgl_printed(receiver: SgReceiver, light: SgLight) -> vec3f {
     if !(c > 0.0 && faces(receiver, view.direction)) {
         return vec3f(0.0);
     }
-    let s = max(cone_scaled_sharpness(view.distance, light.radius), 1e-36);
+    let s = max(cone_scaled_sharpness(view.distance, light.radius), 1e-24);
     var reflected = light.diffuse * (view.light_cosine * c * 4.0 / s);
 #ifdef SPECULAR
     reflected += light.specular * (view.above * c * vsgl_kernel_diffuse_receiver(-light.axis, light.sharpness, view.direction, view.distance, light.radius));
@@ -471,7 +479,8 @@ fn vsgl_printed(receiver: SgReceiver, light: SgLight) -> vec3f {
     let own = receiver.strength * light.radius * light.radius / s;
     let dominant = mix(c, fixed_cosine(receiver.lobe), own / (1.0 + own));
     let shading = masking_and_fresnel(receiver.lobe, dominant, dot(receiver.lobe.fixed_direction, view.direction)) * dominant;
-    return reflected + glossy * receiver.sg_lobe.amplitude * shading;
+    // Bounded, so that times nothing it is nothing.
+    return reflected + min(glossy, vec3f(1e28)) * (receiver.sg_lobe.amplitude * shading);
 #else
     return reflected * receiver.diffuse;
 #endif

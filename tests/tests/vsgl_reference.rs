@@ -67,7 +67,13 @@ fn a_diffuse_scene_has_no_lobes_and_less_memory() {
         let wired = graph.wire(&lobelia::registry(), &["vsgl".into()], &[]).unwrap();
         let traits = Scene::load(scene).unwrap().traits();
         let plan = wired.plan(&traits, &lobelia::graph::PlanOptions::new([60, 60])).unwrap();
-        let flags: Vec<String> = plan.passes.iter().flat_map(|pass| pass.specialisations.iter()).filter(|flag| flag.on).map(|flag| flag.flag.to_owned()).collect();
+        let flags: Vec<String> = plan
+            .passes
+            .iter()
+            .flat_map(|pass| pass.specialisations.iter())
+            .filter(|flag| flag.on)
+            .map(|flag| flag.flag.to_owned())
+            .collect();
         (flags.iter().any(|flag| flag == "SPECULAR"), plan.passes.iter().any(|pass| pass.name == "moments"))
     };
     assert_eq!(bytes("builtin:cornell-glossy"), (true, true));

@@ -14,8 +14,8 @@
 //! # Ok(()) }
 //! ```
 
-pub use lobelia_brsm as brsm;
 pub use lobelia_aism as aism;
+pub use lobelia_brsm as brsm;
 pub use lobelia_compose as compose;
 pub use lobelia_direct as direct;
 pub use lobelia_frame as frame;
