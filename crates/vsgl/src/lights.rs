@@ -63,7 +63,7 @@ pub struct VsglLightsParams {
 
 impl Default for VsglLightsParams {
     fn default() -> Self {
-        Self { count: 1024, overlap: 1.0, kernel: Kernel::Mean, edges: OrNone::Value(3.0), least_radius: 1.0, shrink: false, seed: 0 }
+        Self { count: 1024, overlap: 2.0, kernel: Kernel::Mean, edges: OrNone::Value(3.0), least_radius: 1.0, shrink: false, seed: 0 }
     }
 }
 

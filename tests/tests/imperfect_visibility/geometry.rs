@@ -108,22 +108,23 @@ pub fn errors(bits: &Bits, given: &Given, clear: f64, shift: DVec3) -> Errors {
 }
 
 #[test]
-fn away_from_silhouettes_every_bit_is_right() {
+fn away_from_silhouettes_bits_are_right() {
     let Some(gpu) = gpu() else { return };
     let (scene, given) = (scene(1.0), given(1.0));
-    for settings in
-        ["sampling: adaptive", "sampling: uniform", "sampling: adaptive, pull_push: false", "sampling: adaptive, view_samples: 0"]
-    {
+    for settings in ["sampling: adaptive", "sampling: uniform, points: 65536, spread: 2.0", "sampling: adaptive, view_samples: 0"] {
         for interleave in [1, 3] {
             let bits = bits(gpu, &scene, &given, interleave, settings, 0);
             // Of texels 2.5 / 64 wide, seen at up to 2 m, the two next to the rim.
             let found = errors(&bits, &given, 0.15, DVec3::ZERO);
-            assert!(found.hidden > 100 && found.seen > 1000, "{found:?}");
-            assert_eq!((found.leaks, found.dark), (0, 0), "{settings}, interleave {interleave}: {found:?}");
+            println!("{settings}, interleave {interleave}: {found:?}");
+            assert!(found.hidden > 700 && found.seen > 3000, "{found:?}");
+            assert_eq!(found.dark, 0, "{settings}, interleave {interleave}: {found:?}");
+            // Points are random: two gaps next to each other are rare, but no accident.
+            assert!(found.leaks * 400 <= found.hidden, "{settings}, interleave {interleave}: {found:?}");
             assert!((0..LIGHTS).all(|light| bits.sees(7, light) != Some(true)), "nothing is there");
             // What the comparison is worth: a square elsewhere is noticed.
             let elsewhere = errors(&bits, &given, 0.15, DVec3::new(0.3, 0.0, 0.0));
-            assert!(elsewhere.leaks > 50 && elsewhere.dark > 50, "{elsewhere:?}");
+            assert!(elsewhere.leaks * 20 > elsewhere.hidden && elsewhere.dark * 50 > elsewhere.seen, "{elsewhere:?}");
         }
     }
 }
@@ -132,14 +133,21 @@ fn away_from_silhouettes_every_bit_is_right() {
 fn holes_leak_and_pull_push_closes_them() {
     let Some(gpu) = gpu() else { return };
     let (scene, given) = (scene(1.0), given(1.0));
-    for sampling in ["adaptive", "uniform"] {
-        let leaks = |pull_push: bool, spread: f32| {
-            let settings = format!("sampling: {sampling}, points: 2048, spread: {spread}, pull_push: {pull_push}");
-            errors(&bits(gpu, &scene, &given, 1, &settings, 0), &given, 0.15, DVec3::ZERO).leaks
+    // Uniform points go to the wall mostly, so that as few hit the square as here with eight times fewer adaptive ones.
+    for (sampling, points) in [("adaptive", 1024), ("uniform", 8192)] {
+        let found = |pull_push: bool, spread: f32| {
+            let settings = format!("sampling: {sampling}, points: {points}, spread: {spread}, pull_push: {pull_push}");
+            errors(&bits(gpu, &scene, &given, 1, &settings, 0), &given, 0.15, DVec3::ZERO)
         };
-        let (open, closed, wide) = (leaks(false, 0.5), leaks(true, 0.5), leaks(false, 1.25));
-        assert!(open > 10 * closed.max(10) / 4, "{sampling}: {open} leaks without, {closed} with pull-push");
-        assert!(wide < open / 4, "{sampling}: {open} leaks of disks that do not meet, {wide} of those that do");
+        let (narrow, narrow_closed) = (found(false, 0.7), found(true, 0.7));
+        let (wide, wide_closed) = (found(false, 1.25), found(true, 1.25));
+        println!("{sampling}: {narrow:?} {narrow_closed:?} {wide:?} {wide_closed:?}");
+        assert!(narrow.leaks > narrow_closed.leaks + 200, "{sampling}: {narrow:?} without, {narrow_closed:?} with pull-push");
+        assert!(wide.leaks > 2 * wide_closed.leaks, "{sampling}: {wide:?} without, {wide_closed:?} with pull-push");
+        assert!(narrow.leaks > 3 * wide.leaks, "disks that do not meet leak more: {narrow:?} {wide:?}");
+        for closed in [narrow_closed, wide_closed] {
+            assert!(closed.dark * 1000 < closed.seen, "what closes holes darkens nothing far from shadows: {closed:?}");
+        }
     }
 }
 

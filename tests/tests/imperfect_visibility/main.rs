@@ -8,6 +8,7 @@ mod geometry;
 #[path = "../virtual_lights/given.rs"]
 mod given;
 mod refuse;
+mod table;
 
 use given::{EXTENT, PIXELS};
 use lobelia::frame::SceneWorld;
