@@ -75,7 +75,7 @@ pub struct Params {
     /// be larger than what a light can see as one: more for scenes with much surface. Time grows linearly.
     #[param(unit = "patches", range = 256..=65536)]
     pub candidates: u32,
-    /// Pixels that each light looks at to learn where receivers are (adaptive sampling). Patches with no receiver behind them get a fiftieth of the
+    /// Pixels that each light looks at to learn where receivers are (adaptive sampling). Patches with no receiver behind them get a tenth of the
     /// points. 0 does not look: points then fill the whole map evenly, and do not depend on the camera.
     #[param(unit = "pixels", range = 0..=16384)]
     pub view_samples: u32,
@@ -83,7 +83,8 @@ pub struct Params {
     /// evenly; far above, shadows grow at their edges.
     #[param(unit = "radii", range = 0.25..=4.0)]
     pub spread: f32,
-    /// Whether empty texels take what coarser levels of the map know of their neighbours. Without it, light leaks through the gaps between points.
+    /// Whether texels that no point reached refer to the nearest that one did, found by pulling and pushing through the levels of the map. Without it, light
+    /// leaks through the gaps between points; with it, some corners and edges are darker.
     pub pull_push: bool,
     /// Length by which a receiver is moved off its surface before it is compared, in widths of a map's texel where the receiver is: in metres
     /// `bias * 2.5 / resolution * distance to the light`. So it follows the error of the map, which grows likewise, in scenes of any size. More hides acne on curved
@@ -171,7 +172,7 @@ impl Pass for AismPass {
     const NAME: &'static str = "aism";
     const DOC: &'static str = "Approximate visibility between pixels and virtual lights, by adaptive imperfect shadow maps.\n\
         Ritschel et al. 2008 and 2011. Every light has a tiny map of its hemisphere, drawn from a few thousand points that are chosen anew each frame and closed by \
-        pull-push. Its cost grows with lights x (points + pixels), not with rays: far cheaper than `visibility` in large scenes and pictures, with wrong bits at edges.";
+        pull-push. Its cost grows with lights x (points + pixels), not with rays: cheaper than `visibility` in large scenes and pictures, with wrong bits at edges.";
     type World = SceneWorld;
     type Params = Params;
     type Inputs = Inputs;

@@ -10,7 +10,7 @@
 //!    cover before it, and by whether anything that the camera sees lies behind them. The running sum of the weights tells where points go.
 //! 2. `splat`. Each point is a disk that stands for its share of the surface. A texel keeps the nearest plane whose disk it sees (`atomicMin`; a
 //!    positive float's bits are ordered as it is).
-//! 3. `pull` and `push`. Empty texels take what coarser levels know of their neighbours.
+//! 3. `mark_gaps`, `pull` and `push`. Texels that are empty, or that see background between nearer neighbours, refer to a near texel that is neither.
 //! 4. `look_up`. Four texels around a receiver are compared with the receiver's own plane, one bit comes out.
 //!
 //! How the 2011 paper conditions its sampler could not be checked; patches, weights and their systematic resampling are a design of this project, and so

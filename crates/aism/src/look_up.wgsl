@@ -72,9 +72,6 @@ fn receiver_normal(pixel: vec2u) -> vec3f {
 // shade each other.
 const REFERENCE_SLOPE: f32 = 4.0;
 
-// Farther than this many texel widths beyond the receiver itself, its plane is not followed: a plane seen at grazing angles runs to the horizon.
-const MOST_SLOPE: f32 = 0.0;
-
 // Whether what a light's map knows leaves the receiver (in the light's frame) lit.
 fn lit(slot: u32, receiver: vec3f, receiver_side: vec3f) -> bool {
     let side = f32(settings.resolution);
@@ -111,13 +108,13 @@ fn lit(slot: u32, receiver: vec3f, receiver_side: vec3f) -> bool {
             texel = vec2f(other);
             word = maps[start_of_map + other.y * settings.resolution + other.x];
         }
-        // Where the ray through the texel's centre meets the receiver's plane.
+        // Where the ray through the texel's centre meets the receiver's plane, but not beyond the receiver: what another surface that meets this one holds
+        // there would seem to hide it.
         let ray = hemi_octahedral_decode((texel + vec2f(0.5)) * (2.0 / side) - vec2f(1.0));
         let slope = dot(receiver_side, ray);
-        let farthest = distance * (1.0 + MOST_SLOPE * texel_width);
-        var along = farthest;
+        var along = distance;
         if slope < 0.0 && height < 0.0 {
-            along = min(height / slope, farthest);
+            along = min(height / slope, distance);
         }
         if bitcast<f32>(word) >= along * (1.0 - tolerance) {
             seen += shares.x * shares.y;
