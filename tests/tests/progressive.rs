@@ -224,7 +224,7 @@ fn a_progressive_rendering_converges() {
     }
     let text = r#"(
         passes: {
-            "gbuffer": gbuffer(), "rsm": rsm(resolution: 128), "lights": vpl_lights(count: 16), "indirect": vpl_gather(),
+            "gbuffer": gbuffer(), "rsm": rsm(resolution: 128), "density": flux_density(), "lights": vpl_lights(count: 16), "indirect": vpl_gather(),
             "mean": progressive(from: {"radiance": "indirect.radiance"}),
         },
         output: "mean.radiance",

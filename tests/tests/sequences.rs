@@ -9,7 +9,7 @@ use std::process::{Command, Output};
 const GRAPH: &str = r#"(
     passes: {
         "gbuffer": gbuffer(), "rsm": rsm(resolution: 64), "direct": direct(),
-        "lights": vpl_lights(count: 8), "indirect": vpl_gather(),
+        "density": flux_density(), "lights": vpl_lights(count: 8), "indirect": vpl_gather(),
         "sum": compose(from: {"terms": ["direct.radiance", "indirect.radiance"]}),
     },
     output: "sum.radiance",
@@ -62,9 +62,9 @@ fn what_flickers_is_told_from_what_is_steady() {
         assert!(few > 0.02 && few > 4.0 * many && many > 0.0, "{against}: {found:?}");
         // Nothing random, nothing that moves.
         assert_eq!(direct, 0.0);
-        // Frames that draw the same numbers are the same picture.
+        // Frames that draw the same numbers are the same picture, but for where the clock cuts the sum over many lights.
         let (found, ..) = place.flicker(&format!("{all} --flicker-against {against}"));
-        assert_eq!(found, [0.0; 3], "{against}");
+        assert!(found.iter().all(|flicker| *flicker < 1e-6), "{against}: {found:?}");
     }
 }
 

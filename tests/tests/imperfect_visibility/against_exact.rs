@@ -12,7 +12,7 @@ const EXTENT: [u32; 2] = [48, 48];
 fn words(visibility: &str) -> Vec<u32> {
     let text = format!(
         r#"(passes: {{
-            "gbuffer": gbuffer(), "rsm": rsm(resolution: 128), "lights": vpl_lights(count: {LIGHTS}),
+            "gbuffer": gbuffer(), "rsm": rsm(resolution: 128), "density": flux_density(), "lights": vpl_lights(count: {LIGHTS}),
             "visibility": {visibility}, "indirect": vpl_gather(),
         }}, output: "indirect.radiance")"#
     );

@@ -33,7 +33,7 @@ fn without_lights_no_map_is_drawn() {
     let mut scene = Scene::load("builtin:cornell-glossy").unwrap();
     scene.lights.clear();
     let text = r#"(passes: {
-        "gbuffer": gbuffer(), "rsm": rsm(), "lights": vpl_lights(), "visibility": aism(), "indirect": vpl_gather(),
+        "gbuffer": gbuffer(), "rsm": rsm(), "density": flux_density(), "lights": vpl_lights(), "visibility": aism(), "indirect": vpl_gather(),
         "sum": compose(from: {"terms": ["indirect.radiance"]}),
     }, output: "sum.radiance")"#;
     let plan = plan(text, &scene, &[]).unwrap();

@@ -21,7 +21,7 @@ struct Outcome {
 fn outcome(session: &mut Session, visibility: &str) -> Outcome {
     let text = format!(
         r#"(passes: {{
-            "gbuffer": gbuffer(), "rsm": rsm(resolution: 1024), "lights": vpl_lights(count: {LIGHTS}),
+            "gbuffer": gbuffer(), "rsm": rsm(resolution: 1024), "density": flux_density(), "lights": vpl_lights(count: {LIGHTS}),
             "visibility": {visibility}, "indirect": vpl_gather(),
         }}, output: "indirect.radiance")"#
     );
