@@ -121,17 +121,37 @@ fn evaluate_brdf(brdf: Brdf, n: vec3f, geometric_normal: vec3f, l: vec3f, v: vec
     return brdf.diffuse + evaluate_specular(brdf, n, l, v, n_dot_l, n_dot_v);
 }
 
-// About the share of the light from a direction that the surface reflects: diffuse albedo plus Karis' fit for GGX (Physically Based Shading on
-// Mobile, 2014). It steers sampling and no picture depends on it, which is as well: for n.l >= 0.1 and GGX the specular part is off by up to 0.09
-// (dielectric) or 0.42 (rough white metal), mostly too low at grazing angles.
-fn albedo_estimate(brdf: Brdf, n_dot_l: f32) -> vec3f {
-    var albedo = brdf.diffuse * PI;
-#ifdef SPECULAR
-    let roughness = sqrt(brdf.alpha);
-    let r = roughness * vec4f(-1.0, -0.0275, -0.572, 0.022) + vec4f(1.0, 0.0425, 1.04, -0.04);
-    let a004 = min(r.x * r.x, exp2(-9.28 * n_dot_l)) * r.x + r.y;
-    let ab = vec2f(-1.04, 1.04) * a004 + r.zw;
-    albedo += max(brdf.reflectance_normal * ab.x + vec3f(brdf.reflectance_grazing * ab.y), vec3f(0.0));
+// About the integrals over v of D G2 / (4 n.l), in x, and of the same times (1 - l.h)^5, in y: rational functions of alpha and
+// n.l / sqrt((n.l)^2 + alpha^2). 0 <= y <= x <= 1; off by 0.011 at the most. What the Phong distribution reflects beyond 1 is cut off.
+fn specular_albedo_fit(alpha: f32, n_dot_l: f32) -> vec2f {
+    let c = clamp(n_dot_l, 0.0, 1.0);
+    let s = c * inverseSqrt(c * c + alpha * alpha);
+#ifdef NDF_PHONG
+    let above = 0.997736 + s * (-0.968412 + s * (0.317288 + s * -0.0929721)) + alpha * (-1.31369 + s * (0.551209 + s * 0.00188316) + alpha * (0.681277 + s * -0.0274519 + alpha * -0.135508));
+    let below = 1.0 + s * (-0.728012 + s * -0.0197746) + alpha * (-1.43441 + s * 0.668922 + alpha * 0.594364);
+    let schlick_above = 1.00669 + s * (-0.561109 + s * (-0.174035 + s * 0.269014)) + alpha * (-1.57555 + s * 0.506553 + alpha * 0.852314);
+    let schlick_below = 1.0 + s * (-0.429838 + s * -0.0352457) + alpha * (3.48862 + s * -4.35659 + alpha * -0.740597);
+#else
+    let above = 0.99306 + s * (1.22247 + s * (-2.23416 + s * 0.527537)) + alpha * (-1.10864 + s * (0.161537 + s * 0.634634) + alpha * (0.403376 + s * -0.606537 + alpha * 0.0411019));
+    let below = 1.0 + s * (1.33293 + s * -1.82067) + alpha * (-1.14555 + s * 0.73785 + alpha * 0.47553);
+    let schlick_above = 0.976585 + s * (-0.490827 + s * (-0.333969 + s * 0.154412)) + alpha * (-0.482999 + s * 0.666946 + alpha * -0.107508);
+    let schlick_below = 1.0 + s * (-0.320595 + s * -0.370928) + alpha * (14.5281 + s * -13.5666 + alpha * -5.2135);
 #endif
-    return albedo;
+    let all = clamp(above / below, 0.0, 1.0);
+    return vec2f(all, clamp(fifth_power(1.0 - c) * schlick_above / schlick_below, 0.0, all));
+}
+
+// Share of the light from a direction that the specular lobe reflects, scattered once: within 0.011 of the larger reflectance.
+fn specular_albedo(brdf: Brdf, n_dot_l: f32) -> vec3f {
+#ifdef SPECULAR
+    let fit = specular_albedo_fit(brdf.alpha, n_dot_l);
+    return brdf.reflectance_normal * (fit.x - fit.y) + vec3f(brdf.reflectance_grazing * fit.y);
+#else
+    return vec3f(0.0);
+#endif
+}
+
+// About the share of the light from a direction that the surface reflects, diffuse and specular.
+fn albedo_estimate(brdf: Brdf, n_dot_l: f32) -> vec3f {
+    return brdf.diffuse * PI + specular_albedo(brdf, n_dot_l);
 }

@@ -43,6 +43,11 @@ fn rsm_cube_face(direction: vec3f) -> u32 {
     return select(4u, 5u, direction.z < 0.0);
 }
 
+// Centre of a texel.
+fn rsm_texel_uv(texel: vec2u, resolution: u32) -> vec2f {
+    return (vec2f(texel) + vec2f(0.5)) / f32(resolution);
+}
+
 fn rsm_ndc(uv: vec2f) -> vec2f {
     return vec2f(2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y);
 }
@@ -69,6 +74,18 @@ fn rsm_distance(face: RsmFace, depth: f32) -> f32 {
 
 fn rsm_position(face: RsmFace, uv: vec2f, depth: f32) -> vec3f {
     return rsm_ray_origin(face, uv) + rsm_ray(face, uv) * rsm_distance(face, depth);
+}
+
+// Width of a texel in metres on a plane across the view, at a stored depth > 0.
+fn rsm_footprint(face: RsmFace, depth: f32, resolution: f32) -> f32 {
+    return 2.0 * length(face.right) / resolution * select(rsm_distance(face, depth), 1.0, face.depth_range != 0.0);
+}
+
+// The position of a virtual light: the texel's centre. A place spread over the texel's plane would look less regular, but at the edges of the scene half of
+// such places lie behind the next wall, where no pixel sees them. The lift is the precision to which rasterisers place triangles, 1/256 of a texel: no
+// light may start below its own surface.
+fn rsm_lifted_position(face: RsmFace, uv: vec2f, depth: f32, normal: vec3f, resolution: f32) -> vec3f {
+    return rsm_position(face, uv, depth) + normal * (rsm_footprint(face, depth, resolution) / 256.0);
 }
 
 // Flux through the texel at `uv` of a map of `resolution` texels a side, W per channel: intensity times solid angle (cos^3 over the area on the plane at

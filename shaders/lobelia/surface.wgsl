@@ -73,6 +73,16 @@ fn unpack_surface(packed: PackedSurface) -> Surface {
     return surface;
 }
 
+// What a patch's reflected radiance is multiplied with where shading and geometric normal differ: light falls on the area that the geometric normal gives,
+// but is reflected with the shading normal's cosine. 0 where the light is below the shading normal's horizon.
+fn shading_normal_factor(surface: Surface, to_light: vec3f) -> f32 {
+#ifdef NORMAL_MAP
+    return max(dot(surface.normal, to_light), 0.0) / max(dot(surface.geometric_normal, to_light), 0.01);
+#else
+    return 1.0;
+#endif
+}
+
 struct MaterialTexels {
     // Linear.
     base_color: vec4f,

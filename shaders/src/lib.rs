@@ -36,6 +36,7 @@ pub fn modules() -> &'static [Source<'static>] {
     modules![
         "math",
         "octahedral",
+        "hemi_octahedral",
         "sg",
         "sg_cosine",
         "asg",
@@ -55,8 +56,12 @@ pub fn modules() -> &'static [Source<'static>] {
         "ray",
         "raster",
         "reflective_shadow_map",
+        "patch_moments",
+        "sampling_density",
         "virtual_lights",
+        "vsgl",
         "light_visibility",
+        "interleaving",
         "intersect"
     ]
 }

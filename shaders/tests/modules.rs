@@ -3,7 +3,7 @@
 
 use lobelia_shaders::{Composer, Flags, ShaderError, Source, modules};
 
-const FLAGS: [&str; 4] = ["SPECULAR", "NORMAL_MAP", "EMISSIVE", "NDF_PHONG"];
+const FLAGS: [&str; 6] = ["SPECULAR", "NORMAL_MAP", "EMISSIVE", "NDF_PHONG", "LOBE_TOKSVIG", "LOBE_BANERJEE"];
 
 /// An entry that imports all public names of a module by touching the module's path.
 fn importing(path: &str) -> String {

@@ -16,7 +16,7 @@ fn run(folder: &Path, arguments: &str) -> Output {
 
 /// `passes` of a good graph, to be spoiled.
 const GOOD: &str = r#""gbuffer": gbuffer(), "rsm": rsm(resolution: 64), "lights": vpl_lights(count: 64), "visibility": visibility(), "direct": direct(),
-    "indirect": vpl_gather(), "sum": compose(from: {"terms": ["direct.radiance", "indirect.radiance"]}), "tonemap": tonemap(from: {"radiance": "sum.radiance"}),"#;
+    "indirect": vpl_gather(), "sum": compose(from: {"terms": ["direct.radiance", "indirect.radiance"]}), "tonemap": tonemap(from: {"radiance": "sum.radiance"}), "density": flux_density(),"#;
 
 fn graph(passes: &str) -> String {
     format!("(\n  passes: {{\n    {passes}\n  }},\n  output: \"tonemap.image\",\n)\n")

@@ -4,8 +4,8 @@ use crate::{
     draw::{Draw, direction_of, group, row},
     twin::{Expected, Row, Twin},
 };
-use glam::DVec2;
-use lobelia_lobes::{brdf::*, octahedral::*};
+use glam::{DVec2, DVec3};
+use lobelia_lobes::{brdf::*, octahedral::*, specular_albedo::specular_albedo_fit};
 
 /// A normal in `a`, alpha beside it, and a half vector in `b`, mostly where a lobe of that alpha is.
 fn normal_and_half_vector(index: u32) -> Row {
@@ -24,9 +24,64 @@ fn cosines(index: u32) -> Row {
     row([[draw.log_between(1e-3, 1.0), l, v, 0.0], [0.0; 4], [0.0; 4], [0.0; 4]])
 }
 
+/// A direction above the horizon in `a`.
+fn upper_direction(index: u32) -> Row {
+    let direction = Draw::new(index, 104).direction();
+    row([group(direction.with_z(direction.z.abs()), 0.0), [0.0; 4], [0.0; 4], [0.0; 4]])
+}
+
 /// What rounding leaves of sin^2 of the angle between two directions: the parts of the cross product are off by their last places.
 fn sine_error(row: &[f64; 16]) -> f64 {
     4e-7 * direction_of(row, 0).cross(direction_of(row, 1)).length() + 2e-13
+}
+
+/// Alpha in `a.x` and a cosine in `a.y`, the ends of both and cosines as small as alpha among them; reflectance at normal incidence in `b`, at grazing
+/// incidence in `b.w`.
+fn alpha_and_cosine(index: u32) -> Row {
+    let mut draw = Draw::new(index, 104);
+    let alpha = match index % 8 {
+        0 => 1e-3,
+        1 => 1.0,
+        _ => draw.log_between(1e-3, 1.0),
+    };
+    let cosine = match index % 9 {
+        0 => 0.0,
+        1 => 1.0,
+        2 | 3 => (alpha * draw.log_between(1e-3, 1e3)).min(1.0),
+        _ => draw.unit(),
+    };
+    let color = [draw.unit(), draw.unit(), draw.unit(), draw.unit()];
+    row([[alpha, cosine, 0.0, 0.0], color, [0.0; 4], [0.0; 4]])
+}
+
+macro_rules! albedo_twin {
+    ($lobe:literal, $flags:literal, $distribution:expr) => {
+        Twin {
+            name: concat!("brdf::specular_albedo (", $lobe, ")"),
+            wgsl: concat!(
+                "#define SPECULAR\n",
+                $flags,
+                "#import lobelia::brdf::{Brdf, specular_albedo, specular_albedo_fit}\nfn value(input: Input) -> vec4f {\n",
+                "    let brdf = Brdf(vec3f(0.0), input.b.xyz, input.b.w, input.a.x);\n",
+                "    return vec4f(specular_albedo_fit(input.a.x, input.a.y), specular_albedo(brdf, input.a.y).xy);\n}"
+            ),
+            domain: "alpha 1e-3 to 1; cosine 0 to 1; all reflectances",
+            input: alpha_and_cosine,
+            expected: |row| {
+                let (all, schlick) = specular_albedo_fit(row[0], row[1], $distribution);
+                let brdf = Brdf {
+                    diffuse: DVec3::ZERO,
+                    reflectance_normal: DVec3::new(row[4], row[5], row[6]),
+                    reflectance_grazing: row[7],
+                    alpha: row[0],
+                    distribution: $distribution,
+                };
+                let albedo = brdf.specular_albedo(row[1]);
+                // Terms of the fit are up to 80 times what they add up to.
+                [all, schlick, albedo.x, albedo.y].map(|value| Expected::absolute(value, 1e-5).non_negative()).to_vec()
+            },
+        }
+    };
 }
 
 /// Twins of this module.
@@ -89,6 +144,8 @@ fn value(input: Input) -> vec4f { return vec4f(phong_distribution(input.a.w, inp
                 vec![Expected::relative(value, 5e-6 + near(row[1]) + near(row[2])).non_negative()]
             },
         },
+        albedo_twin!("GGX", "", Distribution::Ggx),
+        albedo_twin!("Phong", "#define NDF_PHONG\n", Distribution::Phong),
         Twin {
             name: "octahedral::octahedral_encode",
             wgsl: "#import lobelia::octahedral::octahedral_encode
@@ -107,6 +164,35 @@ fn value(input: Input) -> vec4f { return vec4f(octahedral_decode(input.a.xy), 0.
                 row([[draw.between(-1.0, 1.0), draw.between(-1.0, 1.0), 0.0, 0.0], [0.0; 4], [0.0; 4], [0.0; 4]])
             },
             expected: |row| octahedral_decode(DVec2::new(row[0], row[1])).to_array().map(|part| Expected::absolute(part, 5e-7)).to_vec(),
+        },
+        Twin {
+            name: "hemi_octahedral::hemi_octahedral_norm",
+            wgsl: "#import lobelia::hemi_octahedral::hemi_octahedral_norm
+fn value(input: Input) -> vec4f { return vec4f(hemi_octahedral_norm(input.a.xyz)); }",
+            domain: "directions with z >= 0",
+            input: upper_direction,
+            expected: |row| vec![Expected::relative(hemi_octahedral_norm(direction_of(row, 0)), 5e-7)],
+        },
+        Twin {
+            name: "hemi_octahedral::hemi_octahedral_encode",
+            wgsl: "#import lobelia::hemi_octahedral::hemi_octahedral_encode
+fn value(input: Input) -> vec4f { return vec4f(hemi_octahedral_encode(input.a.xyz), 0.0, 0.0); }",
+            domain: "directions with z >= 0",
+            input: upper_direction,
+            expected: |row| hemi_octahedral_encode(direction_of(row, 0)).to_array().map(|part| Expected::absolute(part, 1e-6)).to_vec(),
+        },
+        Twin {
+            name: "hemi_octahedral::hemi_octahedral_decode",
+            wgsl: "#import lobelia::hemi_octahedral::hemi_octahedral_decode
+fn value(input: Input) -> vec4f { return vec4f(hemi_octahedral_decode(input.a.xy), 0.0); }",
+            domain: "[-1, 1]^2",
+            input: |index| {
+                let mut draw = Draw::new(index, 105);
+                row([[draw.between(-1.0, 1.0), draw.between(-1.0, 1.0), 0.0, 0.0], [0.0; 4], [0.0; 4], [0.0; 4]])
+            },
+            expected: |row| {
+                hemi_octahedral_decode(DVec2::new(row[0], row[1])).to_array().map(|part| Expected::absolute(part, 5e-7)).to_vec()
+            },
         },
     ]
 }

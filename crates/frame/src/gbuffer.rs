@@ -1,5 +1,5 @@
 use lobelia_graph::{Part, PartSet, Resource, Specialisation, TexturePart, Values};
-use lobelia_scene::SceneTraits;
+use lobelia_scene::{Ndf, SceneTraits};
 use wgpu::{TextureFormat, TextureUsages};
 
 /// Which optional parts of a packed surface exist. Each names the shader flag that switches the matching code on.
@@ -36,6 +36,19 @@ impl SurfaceFlags {
                 "no material has a normal map: geometric-normal target dropped",
             ),
             flag("EMISSIVE", self.emissive, "a material emits", "no material emits: emission target dropped"),
+        ]
+    }
+
+    /// The flags that reflectance depends on, with their reasons: `SPECULAR`, `NORMAL_MAP`, and `NDF_PHONG` for the scene's distribution.
+    pub fn reflectance(self, ndf: Ndf) -> Vec<Specialisation> {
+        let specular =
+            if self.specular { "a material has a specular lobe" } else { "no material has a specular lobe: the lobe is dropped" };
+        let normal_map =
+            if self.normal_map { "a material has a normal map" } else { "no material has a normal map: the side test is dropped" };
+        vec![
+            Specialisation::new("SPECULAR", self.specular, specular),
+            Specialisation::new("NORMAL_MAP", self.normal_map, normal_map),
+            Specialisation::new("NDF_PHONG", self.specular && ndf == Ndf::Phong, format!("the scene's distribution is {ndf}")),
         ]
     }
 }

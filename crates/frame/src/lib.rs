@@ -8,18 +8,24 @@
 //! | [`GBuffer`] | `lobelia::surface`, `lobelia::scene` |
 //! | [`ReflectiveShadowMap`] | `lobelia::reflective_shadow_map`, `lobelia::surface` |
 //! | [`VirtualLights`] | `lobelia::virtual_lights` |
+//! | [`PatchMoments`] | `lobelia::patch_moments` |
+//! | [`SamplingDensity`] | `lobelia::sampling_density` |
 //! | [`LightVisibility`] | `lobelia::light_visibility` |
 //!
 //! *Scene space* is world space minus the scene's whole-metre origin, in metres, so that 32-bit floats keep their precision far from the world's origin.
 
 mod gbuffer;
 mod light;
+mod patch_moments;
 mod radiance;
 mod reflective_shadow_map;
+mod sampling_density;
 mod world;
 
 pub use gbuffer::{GBuffer, GBufferShape, SurfaceFlags, SurfaceFormats};
-pub use light::{LightVisibility, LightVisibilityShape, VirtualLight, VirtualLights, VirtualLightsShape};
+pub use light::{LightVisibility, LightVisibilityShape, VirtualLight, VirtualLightLobes, VirtualLights, VirtualLightsShape};
+pub use patch_moments::{LobeLength, PatchMoments, PatchMomentsShape};
 pub use radiance::{DisplayImage, ImageShape, Radiance};
 pub use reflective_shadow_map::{ReflectiveShadowMap, ReflectiveShadowMapShape, RsmFace};
+pub use sampling_density::{SamplingDensity, SamplingDensityBindings, SamplingDensityLevels, SamplingDensityShape};
 pub use world::SceneWorld;

@@ -8,6 +8,7 @@ pub mod passes;
 pub mod reference;
 pub mod render;
 pub mod scene_info;
+pub mod sequence;
 pub mod sweep;
 
 use crate::failure::Failure;

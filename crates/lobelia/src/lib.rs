@@ -14,6 +14,8 @@
 //! # Ok(()) }
 //! ```
 
+pub use lobelia_aism as aism;
+pub use lobelia_brsm as brsm;
 pub use lobelia_compose as compose;
 pub use lobelia_direct as direct;
 pub use lobelia_frame as frame;
@@ -21,6 +23,7 @@ pub use lobelia_gbuffer as gbuffer;
 pub use lobelia_graph as graph;
 pub use lobelia_lobes as lobes;
 pub use lobelia_measure as measure;
+pub use lobelia_progressive as progressive;
 pub use lobelia_reference as reference;
 pub use lobelia_report as report;
 pub use lobelia_rsm as rsm;
@@ -28,6 +31,8 @@ pub use lobelia_scene as scene;
 pub use lobelia_shaders as shaders;
 pub use lobelia_visibility as visibility;
 pub use lobelia_vpl as vpl;
+pub use lobelia_vsgl as vsgl;
+pub use lobelia_vsl as vsl;
 
 pub mod explain;
 mod session;
@@ -35,7 +40,7 @@ pub mod sweep;
 pub mod trial;
 pub mod truth;
 
-pub use session::{Picture, Rendering, Session, SessionError, SessionOptions, Shot, Step};
+pub use session::{Picture, Rendering, Session, SessionError, SessionOptions, Shot, Step, frame_time};
 
 use lobelia_frame::SceneWorld;
 use lobelia_graph::Registry;
@@ -45,9 +50,14 @@ pub fn registry() -> Registry<SceneWorld> {
     let mut registry = Registry::new();
     lobelia_gbuffer::register(&mut registry);
     lobelia_rsm::register(&mut registry);
+    lobelia_brsm::register(&mut registry);
     lobelia_direct::register(&mut registry);
     lobelia_vpl::register(&mut registry);
+    lobelia_vsgl::register(&mut registry);
+    lobelia_vsl::register(&mut registry);
     lobelia_visibility::register(&mut registry);
+    lobelia_aism::register(&mut registry);
     lobelia_compose::register(&mut registry);
+    lobelia_progressive::register(&mut registry);
     registry
 }

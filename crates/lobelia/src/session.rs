@@ -63,6 +63,11 @@ pub struct Shot {
     pub frames: u32,
     /// Seconds between frames of an animated scene.
     pub frame_seconds: f32,
+    /// Frames are samples of one picture: each has a seed and sub-pixel offsets of its own, and animations stand still. Without, every frame draws
+    /// the same numbers, so that frames differ by what moves alone.
+    pub progressive: bool,
+    /// Every frame has a seed of its own, as a technique that is filtered over time would want it; sub-pixel offsets stay those of the first.
+    pub new_seeds: bool,
     /// Seed of everything random.
     pub seed: u32,
     /// Further resources to keep: `pass.port`.
@@ -81,6 +86,8 @@ impl Default for Shot {
             samples: 1,
             frames: 1,
             frame_seconds: 1.0 / 24.0,
+            progressive: false,
+            new_seeds: false,
             seed: 0,
             keep: Vec::new(),
             specialise: true,
@@ -215,7 +222,7 @@ impl Session {
             sums: Vec::new(),
             reports: Vec::new(),
             view: None,
-            centre: mean_of_spread(shot.samples),
+            centre: mean_of_spread(if shot.progressive { shot.frames.saturating_mul(shot.samples) } else { shot.samples }),
         })
     }
 }
@@ -229,6 +236,11 @@ fn shown_radiance(plan: &Plan<SceneWorld>) -> Option<String> {
     let inputs = plan.passes[output.maker].inputs.iter().flatten();
     let radiance = inputs.map(|index| &plan.resources[*index]).find(|resource| resource.type_name == Radiance::NAME)?;
     Some(radiance.name.clone())
+}
+
+/// Time of a frame of a shot that begins at `start`, seconds.
+pub fn frame_time(start: f32, shot: &Shot, frame: u32) -> f32 {
+    start + frame as f32 * shot.frame_seconds
 }
 
 /// A sum over samples of one radiance image.
@@ -291,23 +303,39 @@ impl Rendering<'_> {
 
     /// Runs all frames and samples; `step` hears how far it is and stops it by returning `false`.
     pub fn run(&mut self, step: &mut dyn FnMut(&Step) -> bool) -> Result<Picture, SessionError> {
+        self.run_frames(step, &mut |_| Ok(()))?;
+        self.picture()
+    }
+
+    /// As [`Rendering::run`]; `seen` is called after every frame, while what it made can be read.
+    pub fn run_frames(
+        &mut self,
+        step: &mut dyn FnMut(&Step) -> bool,
+        seen: &mut dyn FnMut(&Self) -> Result<(), SessionError>,
+    ) -> Result<(), SessionError> {
+        self.runner.reset_history();
         for frame in 0..self.shot.frames {
             self.advance(frame);
             self.sums = self.radiances().into_iter().map(|name| Sum { name, total: Vec::new() }).collect();
             for sample in 0..self.shot.samples {
                 self.sample(frame, sample, step)?;
             }
+            seen(self)?;
         }
-        self.picture()
+        Ok(())
     }
 
     /// Moves an animated scene on.
     fn advance(&mut self, frame: u32) {
-        if frame == 0 || self.session.scene.traits().animation_seconds <= 0.0 {
+        if self.shot.progressive || self.shot.frames == 1 || !self.session.scene.traits().animated {
             return;
         }
         let mut scene = Scene::clone(&self.session.scene);
-        scene.set_time(self.session.time + frame as f32 * self.shot.frame_seconds);
+        scene.set_time(frame_time(self.session.time, &self.shot, frame));
+        // A camera may hang below a node that moves.
+        if let Ok(camera) = scene.camera(self.shot.camera.as_deref()) {
+            self.camera = camera;
+        }
         self.session.scene = Arc::new(scene);
         let queue = self.session.gpu.queue();
         self.session.device.update(queue, self.session.scene.clone());
@@ -318,10 +346,12 @@ impl Rendering<'_> {
             return Err(RunError::Stopped.into());
         }
         let session = &*self.session;
-        let jitter = (spread(sample) - self.centre).as_vec2();
-        // Every sample has its own random numbers; the first has the seed itself.
-        let seed = self.shot.seed.wrapping_add(sample.wrapping_mul(0x9e37_79b9));
         let index = frame.wrapping_mul(self.shot.samples).wrapping_add(sample);
+        let draw = if self.shot.progressive { index } else { sample };
+        let jitter = (spread(draw) - self.centre).as_vec2();
+        // Every sample has its own random numbers; the first has the seed itself.
+        let draw = if self.shot.new_seeds { index } else { draw };
+        let seed = self.shot.seed.wrapping_add(draw.wrapping_mul(0x9e37_79b9));
         let view = ViewUniform::new(&self.camera, session.scene.origin(), self.shot.extent, jitter, index, seed, self.view.as_ref());
         session.device.set_view(session.gpu.queue(), &view);
         self.view = Some(view);

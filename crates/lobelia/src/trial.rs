@@ -25,6 +25,8 @@ pub struct TrialOptions {
     pub rounds: u32,
     /// What is compared: `pass.port` of a radiance; `None` takes the radiance that the graph ends in, before tone mapping.
     pub output: Option<String>,
+    /// Time of animations in the first frame, seconds.
+    pub time: f32,
 }
 
 /// What one pass took.
@@ -49,8 +51,10 @@ pub struct PassMeasured {
 pub struct Measured {
     /// Name of the technique.
     pub name: String,
-    /// What is compared, linear radiance.
+    /// What is compared, linear radiance; of a sequence, its last frame.
     pub image: Image,
+    /// All frames, if there are several.
+    pub frames: Vec<Image>,
     /// `pass.port` of that.
     pub output: String,
     /// In order of execution.
@@ -100,8 +104,9 @@ pub fn run(
         // Software devices run work when they please; the wall clock is right there.
         let software = gpu.info().is_some_and(|info| info.device_type == wgpu::DeviceType::Cpu);
         shot.run.timing = if gpu.has_timestamps() && !software { Timing::Timestamps } else { Timing::Isolated };
-        sessions.push(Session::with(gpu, scene.clone(), 0.0)?);
+        sessions.push(Session::with(gpu, scene.clone(), options.time)?);
     }
+    let mut frames: Vec<Vec<Image>> = vec![Vec::new(); techniques.len()];
     let mut renderings = Vec::new();
     for (session, technique) in sessions.iter_mut().zip(techniques) {
         renderings.push(session.start(&technique.wired, &shot)?);
@@ -113,7 +118,14 @@ pub fn run(
     for round in 0..rounds as usize {
         for (index, (rendering, technique)) in renderings.iter_mut().zip(techniques).enumerate() {
             let done = round * techniques.len() + index;
-            rendering.run(&mut |inner| step(&TrialStep { technique: &technique.name, done, total, step: inner }))?;
+            // The first round of a sequence is kept: all rounds are of the same pictures.
+            let keep = (round == 0 && shot.frames > 1).then(|| output_of(rendering, technique, options)).transpose()?;
+            let kept = &mut frames[index];
+            let mut seen = |rendering: &Rendering<'_>| match &keep {
+                Some(output) => rendering.radiance(output).map(|image| kept.push(image)),
+                None => Ok(()),
+            };
+            rendering.run_frames(&mut |inner| step(&TrialStep { technique: &technique.name, done, total, step: inner }), &mut seen)?;
             ends[index].push(rendering.reports().len());
         }
     }
@@ -121,8 +133,33 @@ pub fn run(
         .iter()
         .zip(techniques)
         .zip(&ends)
-        .map(|((rendering, technique), ends)| measured(rendering, technique, ends, options, shot.run.timing))
+        .zip(frames)
+        .map(|(((rendering, technique), ends), frames)| {
+            Ok(Measured { frames, ..measured(rendering, technique, ends, options, shot.run.timing)? })
+        })
         .collect()
+}
+
+/// `pass.port` of the radiance that is compared.
+fn output_of(rendering: &Rendering<'_>, technique: &Technique, options: &TrialOptions) -> Result<String, SessionError> {
+    let plan = rendering.plan();
+    match &options.output {
+        Some(port) => match plan.find(port) {
+            Some(index) if plan.resources[index].type_name == Radiance::NAME => Ok(plan.resources[index].name.clone()),
+            Some(index) => {
+                let what = format!("--output {port} is {}, but only radiance can be compared", plan.resources[index].type_name);
+                Err(SessionError::Argument(what))
+            }
+            None => Err(SessionError::Argument(format!("`{}` makes no `{port}` on this scene", technique.name))),
+        },
+        None => rendering.linear_output().ok_or_else(|| {
+            let what = format!(
+                "`{}` ends in {}, which is no picture; name what is compared with --output",
+                technique.name, plan.resources[plan.output].name
+            );
+            SessionError::Argument(what)
+        }),
+    }
 }
 
 fn measured(
@@ -133,23 +170,7 @@ fn measured(
     timing: Timing,
 ) -> Result<Measured, SessionError> {
     let plan = rendering.plan();
-    let output = match &options.output {
-        Some(port) => match plan.find(port) {
-            Some(index) if plan.resources[index].type_name == Radiance::NAME => plan.resources[index].name.clone(),
-            Some(index) => {
-                let what = format!("--output {port} is {}, but only radiance can be compared", plan.resources[index].type_name);
-                return Err(SessionError::Argument(what));
-            }
-            None => return Err(SessionError::Argument(format!("`{}` makes no `{port}` on this scene", technique.name))),
-        },
-        None => rendering.linear_output().ok_or_else(|| {
-            let what = format!(
-                "`{}` ends in {}, which is no picture; name what is compared with --output",
-                technique.name, plan.resources[plan.output].name
-            );
-            SessionError::Argument(what)
-        })?,
-    };
+    let output = output_of(rendering, technique, options)?;
     // The first round warms up where there are others.
     let first = if ends.len() > 1 { ends[0] } else { 0 };
     let counted = &rendering.reports()[first..];
@@ -173,6 +194,7 @@ fn measured(
     Ok(Measured {
         name: technique.name.clone(),
         image: rendering.radiance(&output)?,
+        frames: Vec::new(),
         passes: passes.collect(),
         dropped: plan.dropped.iter().map(|dropped| (dropped.pass.clone(), dropped.reason.clone())).collect(),
         round_ms: rounds.chain(single).map(mean).collect(),

@@ -132,6 +132,8 @@ pub struct Truth {
     pub samples: u64,
     /// Relative mean squared error that its own noise makes: differences below about twice this mean nothing.
     pub relative_noise: f64,
+    /// Variance of each value of the image.
+    pub variance: Vec<[f32; 3]>,
     /// Passes that were already there.
     pub cached_passes: u64,
 }
@@ -164,7 +166,7 @@ pub fn truth(
     let relative_noise = picture.relative_noise();
     let [width, height] = settings.size.map(|side| side as usize);
     let image = Image { width, height, pixels: picture.pixels };
-    Ok(Truth { image, samples: picture.samples, relative_noise, cached_passes })
+    Ok(Truth { image, variance: picture.variance, samples: picture.samples, relative_noise, cached_passes })
 }
 
 #[cfg(test)]

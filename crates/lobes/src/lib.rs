@@ -18,6 +18,7 @@ pub mod sg;
 pub mod sg_cosine;
 pub mod sg_light;
 pub mod special;
+pub mod specular_albedo;
 pub mod tonemap;
 
 /// Relative luminance of linear Rec. 709 colour.

@@ -1,4 +1,4 @@
-//! The octahedral map of unit vectors to a square (Cigolle et al. 2014, A Survey of Efficient Representations for Independent Unit Vectors).
+//! The octahedral map of unit vectors to a square, and that of a hemisphere alone (Cigolle et al. 2014, A Survey of Efficient Representations for Independent Unit Vectors).
 
 use glam::{DVec2, DVec3};
 
@@ -36,6 +36,23 @@ pub fn octahedral_pack(direction: DVec3) -> u32 {
 pub fn octahedral_unpack(packed: u32) -> DVec3 {
     let value = |bits: u32| (f64::from(bits as u16 as i16) / 32767.0).max(-1.0);
     octahedral_decode(DVec2::new(value(packed), value(packed >> 16)))
+}
+
+/// |x| + |y| + z: the distance to the origin that belongs to the hemi-octahedral map, for z >= 0.
+pub fn hemi_octahedral_norm(v: DVec3) -> f64 {
+    v.x.abs() + v.y.abs() + v.z
+}
+
+/// Direction with z >= 0 (not zero, of any length) to [-1, 1]^2.
+pub fn hemi_octahedral_encode(v: DVec3) -> DVec2 {
+    let p = v.truncate() / hemi_octahedral_norm(v);
+    DVec2::new(p.x + p.y, p.x - p.y)
+}
+
+/// [-1, 1]^2 to the point of the half octahedron, whose norm is 1.
+pub fn hemi_octahedral_decode(uv: DVec2) -> DVec3 {
+    let p = 0.5 * DVec2::new(uv.x + uv.y, uv.x - uv.y);
+    p.extend(1.0 - p.x.abs() - p.y.abs())
 }
 
 #[cfg(test)]
@@ -86,5 +103,26 @@ mod tests {
             let back = octahedral_decode(octahedral_encode(direction));
             assert!((back - direction).length() < 1e-12, "{direction} {back}");
         }
+    }
+
+    #[test]
+    fn hemispheres_fill_the_square_and_come_back() {
+        for direction in directions().into_iter().filter(|direction| direction.z >= 0.0) {
+            let uv = hemi_octahedral_encode(direction * 3.0);
+            assert!(uv.abs().max_element() <= 1.0 + 1e-15);
+            let back = hemi_octahedral_decode(uv);
+            assert!((hemi_octahedral_norm(back) - 1.0).abs() < 1e-12 && (back.normalize() - direction).length() < 1e-12);
+        }
+        assert_eq!(hemi_octahedral_decode(DVec2::new(1.0, 1.0)), DVec3::X, "corners are on the horizon");
+    }
+
+    /// What the shadow maps of virtual lights rest on: along a row of a face, the reciprocal distance of a plane has no curvature.
+    #[test]
+    fn reciprocal_distances_of_planes_are_linear_on_faces() {
+        let (normal, height) = (DVec3::new(0.3, -0.2, 0.9), 2.0);
+        let reciprocal = |u: f64, v: f64| normal.dot(hemi_octahedral_decode(DVec2::new(u, v))) / height;
+        let second_difference = |step: f64| reciprocal(0.5 - step, 0.1) - 2.0 * reciprocal(0.5, 0.1) + reciprocal(0.5 + step, 0.1);
+        assert!(second_difference(0.3).abs() < 1e-15);
+        assert!(second_difference(0.45).abs() > 1e-2, "across the edge of a face it bends");
     }
 }

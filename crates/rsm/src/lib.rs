@@ -11,8 +11,12 @@
 //! 90 degrees each so that they meet without a seam; a directional light takes one orthographic face fitted around the scene.
 
 mod faces;
+mod flux_density;
+mod patch_moments;
 mod rsm;
 
+pub use flux_density::FluxDensityPass;
+pub use patch_moments::{PatchMomentsParams, PatchMomentsPass};
 pub use rsm::{Params, RsmPass};
 
 use lobelia_frame::SceneWorld;
@@ -20,5 +24,5 @@ use lobelia_graph::Registry;
 
 /// Adds the passes of this crate.
 pub fn register(registry: &mut Registry<SceneWorld>) {
-    registry.add::<RsmPass>();
+    registry.add::<RsmPass>().add::<FluxDensityPass>().add::<PatchMomentsPass>();
 }

@@ -13,7 +13,7 @@ use crate::{Scene, SceneError, SceneTraits};
 use bytemuck::{Pod, Zeroable};
 use encase::ShaderType;
 use material::{Materials, environment_view, material_layout};
-use std::sync::Arc;
+use std::{cell::Cell, sync::Arc};
 use uniform::{instance_bytes, light_bytes, view_bytes};
 
 #[repr(C)]
@@ -57,6 +57,9 @@ pub struct GpuScene {
     indices: wgpu::Buffer,
     materials: Vec<wgpu::BindGroup>,
     draws: Vec<Draw>,
+    /// The last view, without what does not move the camera, and how often it or the scene changed.
+    seen: Cell<Option<ViewUniform>>,
+    version: Cell<u64>,
 }
 
 const VERTEX_ATTRIBUTES: [wgpu::VertexAttribute; 4] =
@@ -115,11 +118,22 @@ impl GpuScene {
             materials,
             draws,
             scene,
+            seen: Cell::new(None),
+            version: Cell::new(0),
         })
+    }
+
+    /// How often scene or camera changed. What a pass has gathered over frames is of another picture if this is not what it was.
+    pub fn picture_version(&self) -> u64 {
+        self.version.get()
     }
 
     /// Writes the camera of the next frame.
     pub fn set_view(&self, queue: &wgpu::Queue, view: &ViewUniform) {
+        let camera = view.camera_only();
+        if self.seen.replace(Some(camera)) != Some(camera) {
+            self.version.set(self.version.get() + 1);
+        }
         queue.write_buffer(&self.view, 0, &view_bytes(view));
     }
 
@@ -127,6 +141,7 @@ impl GpuScene {
     pub fn update(&mut self, queue: &wgpu::Queue, scene: Arc<Scene>) {
         queue.write_buffer(&self.lights, 0, &light_bytes(&scene));
         queue.write_buffer(&self.instances, 0, &instance_bytes(&scene));
+        self.version.set(self.version.get() + 1);
         self.scene = scene;
     }
 

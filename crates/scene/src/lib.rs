@@ -20,6 +20,10 @@
 //!         "bulb": point(position: (1, 1, 1), intensity: (2, 2, 2)),
 //!         "sun": directional(direction: (0, -1, -1), illuminance: (3, 3, 3)),
 //!     },
+//!     light_motion: {                              // key frames of any light of the scene, instead of the file's animation of it; seconds rise
+//!         "key": [(seconds: 0, position: (0, 2, 0), direction: (0, -1, 0)), (seconds: 2, position: (1, 2, 0), direction: (1, -1, 0))],
+//!         "bulb": [(seconds: 0.5, position: (1, 1, 1)), (seconds: 1, position: (1, 1, 2))],
+//!     },
 //!     materials: {                                 // in this order; "*" is every surface that is not an area light's
 //!         "*": (specular: 0.0),
 //!         "Gold": (roughness: 0.2, base_color: (1, 0.8, 0.3), metallic: 1, emissive: (0, 0, 0), normal_map: false),
@@ -43,6 +47,7 @@ mod gltf;
 mod light;
 mod material;
 mod mesh;
+mod motion;
 mod ndf;
 mod nodes;
 mod tangents;
@@ -94,6 +99,7 @@ pub struct Scene {
     /// What the file asked for that is not done, in words.
     pub warnings: Vec<String>,
     nodes: NodeTree,
+    motions: Vec<motion::LightMotion>,
     version: u64,
 }
 
@@ -158,8 +164,10 @@ impl Scene {
         }
         let lights = self.lights.iter().map(|light| ("light", &light.name, light.position));
         let cameras = self.cameras.iter().map(|camera| ("camera", &camera.name, camera.position));
+        let ways = self.motions.iter().flat_map(|motion| motion.keys.iter().map(|key| ("light", &motion.light, key.position)));
+        let ways = ways.filter_map(|(kind, name, position)| Some((kind, name, position?)));
         let origin = self.origin();
-        for (kind, name, position) in lights.chain(cameras) {
+        for (kind, name, position) in lights.chain(cameras).chain(ways) {
             if !position.is_finite() || (position - origin).abs().max_element() > MAX_REACH {
                 let what =
                     format!("{kind} `{name}` is at {position}; it must be within {MAX_REACH:e} m of the scene, which is at {origin}");
@@ -172,12 +180,27 @@ impl Scene {
     /// Moves animated nodes to a time in seconds; before the start and after the end of an animation its first and last values hold. All
     /// animations of a file play at once.
     pub fn set_time(&mut self, seconds: f32) {
+        let mut moved = false;
         if self.nodes.is_animated() {
             self.nodes.animate(seconds);
-            if self.place_nodes() {
-                self.version += 1;
+            moved = self.place_nodes();
+        }
+        moved |= self.move_lights(seconds);
+        self.version += u64::from(moved);
+    }
+
+    /// Puts lights where their key frames say; whether anything moved.
+    fn move_lights(&mut self, seconds: f32) -> bool {
+        let mut moved = false;
+        for motion in &self.motions {
+            let (position, direction) = motion.at(seconds);
+            for light in self.lights.iter_mut().filter(|light| light.name == motion.light) {
+                let (position, direction) = (position.unwrap_or(light.position), direction.unwrap_or(light.direction));
+                moved |= (light.position, light.direction) != (position, direction);
+                (light.position, light.direction) = (position, direction);
             }
         }
+        moved
     }
 
     /// Puts instances, lights and cameras where their nodes are; whether anything moved.
@@ -311,6 +334,10 @@ impl Scene {
     }
 
     pub(crate) fn animation_seconds(&self) -> f32 {
-        self.nodes.animation_seconds()
+        self.motions.iter().map(motion::LightMotion::end).fold(self.nodes.animation_seconds(), f32::max)
+    }
+
+    pub(crate) fn is_animated(&self) -> bool {
+        self.nodes.is_animated() || !self.motions.is_empty()
     }
 }

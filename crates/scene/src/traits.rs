@@ -203,7 +203,7 @@ pub(crate) fn of(scene: &Scene) -> SceneTraits {
         disk_lights: area(|shape| matches!(shape, AreaShape::Disk { .. })),
         sphere_lights: area(|shape| matches!(shape, AreaShape::Sphere { .. })),
         environment: scene.environment.is_some(),
-        animated: scene.nodes.is_animated(),
+        animated: scene.is_animated(),
         animation_seconds: scene.animation_seconds(),
         bounds: scene.bounds(),
         ndf: scene.ndf,

@@ -1,5 +1,6 @@
 //! RON scenes: a glTF file (or a built-in scene) with camera, lights, environment and materials added or overridden.
 
+mod motion;
 mod position;
 
 use crate::{Camera, Environment, LightKind, Ndf, PunctualLight, Scene, SceneError, error::suggestion, files, gltf::check_light};
@@ -53,6 +54,8 @@ struct Written {
     lights: Ordered<WrittenLight>,
     #[serde(default = "yes")]
     keep_lights: bool,
+    #[serde(default)]
+    light_motion: Ordered<Vec<motion::WrittenKey>>,
     #[serde(default)]
     materials: Ordered<WrittenMaterial>,
 }
@@ -203,6 +206,7 @@ pub(crate) fn parse(text: &str, shown: &str, folder: &Path) -> Result<Scene, Sce
     }
     add_cameras(&file, &mut scene, &written.cameras)?;
     add_lights(&file, &mut scene, &written.lights)?;
+    motion::add(&file, &mut scene, &written.light_motion)?;
     change_materials(&file, &mut scene, &written.materials)?;
     Ok(scene)
 }

@@ -1,7 +1,6 @@
 //! The `vpl-gather` pass.
 
-use crate::reflectance_flags;
-use lobelia_frame::{GBuffer, ImageShape, LightVisibility, LightVisibilityShape, Radiance, SceneWorld, VirtualLights};
+use lobelia_frame::{GBuffer, ImageShape, LightVisibility, Radiance, SceneWorld, VirtualLights};
 use lobelia_graph::{
     BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OrNone, OutputShapes, Params, Pass, PlanContext,
     PortError, Ports, RunError, Specialisation, TraitsOf, WorkRate,
@@ -98,7 +97,7 @@ impl Pass for VplGatherPass {
 
     fn specialise(context: &PlanContext<'_, Self>, inputs: &InputShapes<Self>) -> Vec<Specialisation> {
         let flags = inputs.gbuffer.flags;
-        let mut found = reflectance_flags(flags.specular, flags.normal_map, context.traits.ndf);
+        let mut found = flags.reflectance(context.traits.ndf);
         let visibility = inputs.visibility.is_some();
         found.push(Specialisation::new(
             "VISIBILITY",
@@ -124,7 +123,7 @@ impl Pass for VplGatherPass {
             return Err(PortError::at("gbuffer", message).help("render a smaller picture"));
         }
         if let Some(visibility) = &inputs.visibility {
-            check_visibility(visibility, extent, inputs.lights.count, context.params.interleave)?;
+            visibility.check_gathering(extent, inputs.lights.count, context.params.interleave)?;
         }
         Ok(OutputsShapes { radiance: ImageShape { extent } })
     }
@@ -190,26 +189,17 @@ impl Pass for VplGatherPass {
             })
         };
         let mut chunks = Vec::new();
-        match &inputs.visibility {
-            None => {
-                let range = range_buffer();
-                let group = group(&self.gather, &range, None)?;
-                chunks.push(Chunk { words: 0..self.words, range, group });
-            }
+        let buffers: Vec<_> = match &inputs.visibility {
+            None => vec![(None, 0..self.words)],
             Some(visibility) => {
-                let per_chunk = visibility.shape.words_per_chunk();
-                for (index, buffer) in visibility.chunks.iter().enumerate() {
-                    let first = index as u32 * per_chunk;
-                    let words = if visibility.chunks.len() == 1 {
-                        0..self.words
-                    } else {
-                        first..first + visibility.shape.words_in_chunk(index as u32)
-                    };
-                    let range = range_buffer();
-                    let group = group(&self.gather, &range, Some(buffer))?;
-                    chunks.push(Chunk { words, range, group });
-                }
+                let words = visibility.shape.gathered_words(self.words);
+                visibility.chunks.iter().map(Some).zip(words).collect()
             }
+        };
+        for (buffer, words) in buffers {
+            let range = range_buffer();
+            let group = group(&self.gather, &range, buffer)?;
+            chunks.push(Chunk { words, range, group });
         }
         let unused = range_buffer();
         // Sub-pictures are padded to whole workgroups; see `lobelia::light_visibility`.
@@ -247,26 +237,4 @@ impl Pass for VplGatherPass {
         });
         Ok(())
     }
-}
-
-/// Visibility must be of the same lights, the same picture, and a pattern that this pass can read.
-fn check_visibility(visibility: &LightVisibilityShape, extent: [u32; 2], lights: u32, interleave: u32) -> Result<(), PortError> {
-    if visibility.extent != extent {
-        let [w, h] = visibility.extent;
-        return Err(PortError::at("visibility", format!("it is of a picture of {w} x {h} pixels, not {} x {}", extent[0], extent[1])));
-    }
-    if visibility.lights != lights {
-        return Err(PortError::at("visibility", format!("it is of {} lights, not of the {lights} that are gathered", visibility.lights))
-            .help("connect both to the same lights"));
-    }
-    if visibility.interleave != interleave && visibility.interleave != 1 {
-        let message = format!("it is interleaved {0} x {0}, but lights are gathered {interleave} x {interleave}", visibility.interleave);
-        let or_one = if interleave == 1 { "" } else { ", or to 1" };
-        return Err(PortError::at("visibility", message).help(format!("set interleave of the visibility pass to {interleave}{or_one}")));
-    }
-    if visibility.interleave != interleave && visibility.chunks() > 1 {
-        return Err(PortError::at("visibility", "it is too large to be read in another interleaving than its own")
-            .help(format!("set interleave of the visibility pass to {interleave}")));
-    }
-    Ok(())
 }

@@ -4,6 +4,7 @@
 // workgroup memory. Sums are kept in 32-bit floats, so that any number of dispatches adds up without loss; `resolve` writes the radiance.
 
 #import lobelia::brdf::{Brdf, brdf_from_surface, evaluate_brdf}
+#import lobelia::interleaving::{same_surface, tent_tap}
 #import lobelia::light_visibility::{interleaved_light, interleaved_pixel, visibility_address}
 #import lobelia::math::{safe_normalize, storable}
 #import lobelia::scene::{View, scene_position, view_depth}
@@ -97,7 +98,7 @@ fn contribution(slot: u32, position: vec3f, surface: Surface, brdf: Brdf, to_vie
     let offset = light_position - position;
     let distance_squared = max(dot(offset, offset), settings.least_distance_squared);
     let direction = safe_normalize(offset, surface.normal);
-    let cosines = max(dot(surface.normal, direction), 0.0) * max(-dot(shared_lights[slot].normal, direction), 0.0);
+    let cosines = max(dot(surface.normal, direction), 0.0) * max(-dot(shared_lights[slot].geometric_normal, direction), 0.0);
     if cosines <= 0.0 {
         return vec3f(0.0);
     }
@@ -160,25 +161,7 @@ fn gather(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_in
     }
 }
 
-#ifdef INTERLEAVED
-// Whether another pixel shows the same surface: a normal within 26 degrees, and no more than a fiftieth of the distance off the plane.
-fn same_surface(other: vec2i, extent: vec2u, position: vec3f, surface: Surface, tolerance: f32) -> bool {
-    if any(other < vec2i(0)) || any(other >= vec2i(extent)) {
-        return false;
-    }
-    let depth = sums[u32(other.y) * extent.x + u32(other.x)].w;
-    if depth <= 0.0 {
-        return false;
-    }
-    let off_plane = abs(dot(scene_position(view, vec2f(other), depth) - position, surface.geometric_normal));
-    return dot(load_surface(vec2u(other)).normal, surface.normal) > 0.9 && off_plane < tolerance;
-}
-#endif
-
-// Radiance of a pixel: its own sum, or with interleaving the sum over all subsets of the lights, each from the pixels around that know it, weighted by a
-// tent that falls to zero k pixels away. A box of k x k pixels would know every light too, but as each then counts at one place of the block, the
-// result steps with period k: on the glossy box its median squared error is 17 times the tent's. Pixels that show another surface do not count;
-// each subset is normalised by itself, so along edges no light is missing that one pixel in reach knows.
+// Radiance of a pixel: its own sum, or with interleaving the sum over all subsets of the lights by the tent filter of lobelia::interleaving.
 @compute @workgroup_size(8, 8)
 fn resolve(@builtin(global_invocation_id) id: vec3u) {
     let extent = vec2u(view.extent);
@@ -192,19 +175,24 @@ fn resolve(@builtin(global_invocation_id) id: vec3u) {
         let side = i32(settings.interleave);
         let surface = load_surface(id.xy);
         let position = scene_position(view, vec2f(id.xy), own.w);
-        let tolerance = 0.02 * view_depth(view, own.w);
+        let distance = view_depth(view, own.w);
         var total = vec3f(0.0);
         var count = 0.0;
         for (var subset = 0; subset < side * side; subset++) {
-            // The up to four pixels of the tent that know this subset lie k apart.
-            let near = vec2i(subset % side, subset / side);
             var weighted = vec4f(0.0);
             for (var choice = 0; choice < 4; choice++) {
-                let offset = near - vec2i(side) * vec2i(choice & 1, choice >> 1u);
-                let other = vec2i(id.xy) + offset;
-                let weight = f32((side - abs(offset.x)) * (side - abs(offset.y)));
-                if weight > 0.0 && same_surface(other, extent, position, surface, tolerance) {
-                    weighted += weight * vec4f(sums[u32(other.y) * extent.x + u32(other.x)].xyz, 1.0);
+                let tap = tent_tap(subset, choice, side);
+                let other = vec2i(id.xy) + tap.offset;
+                if tap.weight <= 0.0 || any(other < vec2i(0)) || any(other >= vec2i(extent)) {
+                    continue;
+                }
+                let known = sums[u32(other.y) * extent.x + u32(other.x)];
+                if known.w <= 0.0 {
+                    continue;
+                }
+                let offset = scene_position(view, vec2f(other), known.w) - position;
+                if same_surface(offset, load_surface(vec2u(other)).normal, surface.normal, surface.geometric_normal, distance) {
+                    weighted += tap.weight * vec4f(known.xyz, 1.0);
                 }
             }
             if weighted.w > 0.0 {

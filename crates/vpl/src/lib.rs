@@ -1,8 +1,8 @@
 //! Virtual point lights (Keller 1997, *Instant Radiosity*; Dachsbacher and Stamminger 2006, *Splatting Indirect Illumination*).
 //!
 //! One bounce of indirect light is direct light from the patches that the light sources reach. [`vpl-lights`](VplLightsPass) picks N patches from the
-//! reflective shadow maps, each with a probability in proportion to the flux that it reflects; [`vpl-gather`](VplGatherPass) adds up, at every
-//! pixel x with view direction v, what they send there:
+//! reflective shadow maps, as likely as a sampling density says (in proportion to the flux that they reflect, say); [`vpl-gather`](VplGatherPass) adds
+//! up, at every pixel x with view direction v, what they send there:
 //!
 //! ```text
 //!   L(x, v) = sum_j  f(x; l_j, v)  (n_x . l_j)  V_j  I_j(-l_j) / d_j^2,      I_j(w) = Phi_j f(y_j; s_j, w) (n_j . w)
@@ -24,22 +24,9 @@ pub use gather::{VplGatherParams, VplGatherPass};
 pub use lights::{VplLightsParams, VplLightsPass};
 
 use lobelia_frame::SceneWorld;
-use lobelia_graph::{Registry, Specialisation};
-use lobelia_scene::Ndf;
+use lobelia_graph::Registry;
 
 /// Adds the passes of this crate.
 pub fn register(registry: &mut Registry<SceneWorld>) {
     registry.add::<VplLightsPass>().add::<VplGatherPass>();
-}
-
-/// Flags of reflectance that both passes need, with reasons.
-fn reflectance_flags(specular: bool, normal_map: bool, ndf: Ndf) -> Vec<Specialisation> {
-    let specular_reason = if specular { "a material has a specular lobe" } else { "no material has a specular lobe: the lobe is dropped" };
-    let normal_reason = if normal_map { "a material has a normal map" } else { "no material has a normal map: the side test is dropped" };
-    let phong = specular && ndf == Ndf::Phong;
-    vec![
-        Specialisation::new("SPECULAR", specular, specular_reason),
-        Specialisation::new("NORMAL_MAP", normal_map, normal_reason),
-        Specialisation::new("NDF_PHONG", phong, format!("the scene's distribution is {ndf}")),
-    ]
 }

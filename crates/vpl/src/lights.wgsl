@@ -1,22 +1,18 @@
-// Picks virtual lights from the texels of reflective shadow maps, in proportion to reflected flux.
-//
-// Rows of all faces, one below the other, form one table. `sum_rows` turns each row into running sums, `sum_totals` does the same for the rows'
-// totals, and `pick` inverts both by binary search with a point of a low-discrepancy sequence.
+// Picks virtual lights from the texels of reflective shadow maps with the points of a low-discrepancy sequence.
 
-#import lobelia::brdf::{albedo_estimate, brdf_from_surface}
-#import lobelia::math::luminance
 #import lobelia::octahedral::octahedral_pack
-#import lobelia::reflective_shadow_map::{RsmFace, rsm_direction_to_light, rsm_distance, rsm_flux, rsm_position}
+#import lobelia::reflective_shadow_map::{RsmFace, rsm_direction_to_light, rsm_flux, rsm_lifted_position, rsm_texel_uv}
 #import lobelia::sampling::r2_point
+#import lobelia::sampling_density::sample_density
 #import lobelia::scene::PunctualLight
-#import lobelia::surface::{PackedSurface, unpack_surface}
+#import lobelia::surface::{PackedSurface, shading_normal_factor, unpack_surface}
 #import lobelia::virtual_lights::VirtualLight
 
 struct Settings {
-    resolution: u32,
-    faces: u32,
     count: u32,
     seed: u32,
+    padding_a: u32,
+    padding_b: u32,
 }
 
 @group(0) @binding(0) var<uniform> settings: Settings;
@@ -30,12 +26,8 @@ struct Settings {
 #ifdef NORMAL_MAP
 @group(0) @binding(6) var rsm_geometric_normal: texture_2d_array<u32>;
 #endif
-// Running sums within each row, and of the rows' totals.
-@group(0) @binding(7) var<storage, read_write> row_sums: array<f32>;
-@group(0) @binding(8) var<storage, read_write> total_sums: array<f32>;
-@group(0) @binding(9) var<storage, read_write> virtual_lights: array<VirtualLight>;
-
-var<workgroup> partial: array<f32, 256>;
+@group(0) @binding(7) var weights: texture_2d_array<f32>;
+@group(0) @binding(8) var<storage, read_write> virtual_lights: array<VirtualLight>;
 
 fn packed_texel(texel: vec2u, face: u32) -> PackedSurface {
     var packed: PackedSurface;
@@ -49,112 +41,6 @@ fn packed_texel(texel: vec2u, face: u32) -> PackedSurface {
     return packed;
 }
 
-fn texel_uv(texel: vec2u) -> vec2f {
-    return (vec2f(texel) + vec2f(0.5)) / f32(settings.resolution);
-}
-
-// Luminance of the flux that a texel reflects, estimated; 0 where nothing is seen.
-fn importance(texel: vec2u, face_index: u32) -> f32 {
-    let depth = textureLoad(rsm_depth, texel, face_index, 0);
-    if depth <= 0.0 {
-        return 0.0;
-    }
-    let face = faces[face_index];
-    let uv = texel_uv(texel);
-    let flux = rsm_flux(face, lights[face.light], uv, f32(settings.resolution));
-    if max(max(flux.x, flux.y), flux.z) <= 0.0 {
-        return 0.0;
-    }
-    let surface = unpack_surface(packed_texel(texel, face_index));
-    let to_light = rsm_direction_to_light(face, rsm_position(face, uv, depth));
-    // The estimate of the specular albedo may be too low; a hundredth of the lobe's scale on top keeps every reflecting texel in play.
-    let albedo = albedo_estimate(brdf_from_surface(surface), max(dot(surface.normal, to_light), 0.0)) + vec3f(0.01 * surface.specular);
-    return luminance(flux * albedo);
-}
-
-// Sum of the values of all invocations before this one.
-fn sum_before(local: u32, value: f32) -> f32 {
-    partial[local] = value;
-    workgroupBarrier();
-    for (var step = 1u; step < 256u; step *= 2u) {
-        var before = 0.0;
-        if local >= step {
-            before = partial[local - step];
-        }
-        workgroupBarrier();
-        partial[local] += before;
-        workgroupBarrier();
-    }
-    return select(0.0, partial[max(local, 1u) - 1u], local > 0u);
-}
-
-@compute @workgroup_size(256)
-fn sum_rows(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
-    let row = group.y * settings.resolution + group.x;
-    let length = (settings.resolution + 255u) / 256u;
-    let first = min(local * length, settings.resolution);
-    let last = min(first + length, settings.resolution);
-    var sum = 0.0;
-    for (var x = first; x < last; x++) {
-        sum += importance(vec2u(x, group.x), group.y);
-        row_sums[row * settings.resolution + x] = sum;
-    }
-    let before = sum_before(local, sum);
-    for (var x = first; x < last; x++) {
-        row_sums[row * settings.resolution + x] += before;
-    }
-    if local == 255u {
-        total_sums[row] = partial[255];
-    }
-}
-
-@compute @workgroup_size(256)
-fn sum_totals(@builtin(local_invocation_index) local: u32) {
-    let rows = settings.resolution * settings.faces;
-    let length = (rows + 255u) / 256u;
-    let first = min(local * length, rows);
-    let last = min(first + length, rows);
-    var sum = 0.0;
-    for (var row = first; row < last; row++) {
-        sum += total_sums[row];
-        total_sums[row] = sum;
-    }
-    let before = sum_before(local, sum);
-    for (var row = first; row < last; row++) {
-        total_sums[row] += before;
-    }
-}
-
-// First row whose running total exceeds `target_sum`.
-fn find_row(target_sum: f32, rows: u32) -> u32 {
-    var low = 0u;
-    var high = rows - 1u;
-    while low < high {
-        let middle = (low + high) / 2u;
-        if total_sums[middle] > target_sum {
-            high = middle;
-        } else {
-            low = middle + 1u;
-        }
-    }
-    return low;
-}
-
-fn find_column(target_sum: f32, row: u32) -> u32 {
-    let start = row * settings.resolution;
-    var low = 0u;
-    var high = settings.resolution - 1u;
-    while low < high {
-        let middle = (low + high) / 2u;
-        if row_sums[start + middle] > target_sum {
-            high = middle;
-        } else {
-            low = middle + 1u;
-        }
-    }
-    return low;
-}
-
 @compute @workgroup_size(64)
 fn pick(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= settings.count {
@@ -163,38 +49,22 @@ fn pick(@builtin(global_invocation_id) id: vec3u) {
     var light: VirtualLight;
     light.direction_to_source = vec3f(0.0, 1.0, 0.0);
     light.geometric_normal = octahedral_pack(vec3f(0.0, 1.0, 0.0));
-    let rows = settings.resolution * settings.faces;
-    let total = total_sums[rows - 1u];
-    // Written so that NaN and infinity leave the light dark as well.
-    if !(total > 0.0 && total < 3e38) {
+    let sample = sample_density(weights, r2_point(id.x, settings.seed));
+    let depth = textureLoad(rsm_depth, sample.texel, sample.face, 0);
+    if sample.probability <= 0.0 || depth <= 0.0 {
         virtual_lights[id.x] = light;
         return;
     }
-    let u = r2_point(id.x, settings.seed);
-    let row = find_row(u.x * total, rows);
-    let start = row * settings.resolution;
-    let column = find_column(u.y * row_sums[start + settings.resolution - 1u], row);
-    let face_index = row / settings.resolution;
-    let texel = vec2u(column, row % settings.resolution);
-    let weight = importance(texel, face_index);
-    let depth = textureLoad(rsm_depth, texel, face_index, 0);
-    if weight <= 0.0 || depth <= 0.0 {
-        virtual_lights[id.x] = light;
-        return;
-    }
-    let face = faces[face_index];
-    let source = lights[face.light];
-    let uv = texel_uv(texel);
-    let packed = packed_texel(texel, face_index);
+    let face = faces[sample.face];
+    let resolution = textureDimensions(rsm_depth).x;
+    let uv = rsm_texel_uv(sample.texel, resolution);
+    let packed = packed_texel(sample.texel, sample.face);
     let surface = unpack_surface(packed);
-    // The texel's centre. A place spread over the texel's plane would look less regular, but at the edges of the scene half of such places lie behind
-    // the next wall, where no pixel sees them. The lift is the precision to which rasterisers place triangles, 1/256 of a texel: no light may start
-    // below its own surface.
-    let footprint = 2.0 * length(face.right) / f32(settings.resolution) * select(rsm_distance(face, depth), 1.0, face.depth_range != 0.0);
-    light.position = rsm_position(face, uv, depth) + surface.geometric_normal * (footprint / 256.0);
-    light.flux = min(rsm_flux(face, source, uv, f32(settings.resolution)) * (total / (f32(settings.count) * weight)), vec3f(1e24));
+    light.position = rsm_lifted_position(face, uv, depth, surface.geometric_normal, f32(resolution));
     light.geometric_normal = octahedral_pack(surface.geometric_normal);
     light.direction_to_source = rsm_direction_to_light(face, light.position);
+    let flux = rsm_flux(face, lights[face.light], uv, f32(resolution)) * shading_normal_factor(surface, light.direction_to_source);
+    light.flux = min(flux / (f32(settings.count) * sample.probability), vec3f(1e24));
 #ifdef SPECULAR
     light.specular = packed.specular;
 #endif

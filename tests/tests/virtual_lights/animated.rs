@@ -47,7 +47,7 @@ fn write_scene(folder: &Path) -> String {
 /// Bits after `frames` frames that start at `time` and are a second apart.
 fn bits(scene: &str, time: f32, frames: u32) -> Vec<u8> {
     let text = r#"(passes: {
-        "gbuffer": gbuffer(), "rsm": rsm(resolution: 64), "lights": vpl_lights(count: 64), "visibility": visibility(), "indirect": vpl_gather(),
+        "gbuffer": gbuffer(), "rsm": rsm(resolution: 64), "density": flux_density(), "lights": vpl_lights(count: 64), "visibility": visibility(), "indirect": vpl_gather(),
     }, output: "indirect.radiance")"#;
     let wired = GraphFile::parse(text, "test.ron").unwrap().wire(&lobelia::registry(), &[], &[]).unwrap();
     let options = SessionOptions { time, baseline: true, ..SessionOptions::default() };

@@ -101,7 +101,8 @@ impl Case {
         if at_x[2] * at_x[3] < 0.0 || at_y[2] * at_y[3] < 0.0 {
             return Some(DVec3::ZERO);
         }
-        let geometry = at_x[0].max(0.0) * at_y[1].max(0.0) / offset.length_squared();
+        // Light leaves the area that the geometric normal gives, and only where the shading normal reflects it.
+        let geometry = if at_y[1] > 0.0 { at_x[0].max(0.0) * at_y[3].max(0.0) / offset.length_squared() } else { 0.0 };
         let geometry = geometry.min(self.clamp.unwrap_or(f64::INFINITY));
         Some(x.brdf.evaluate(x.normal, l, v) * y.brdf.evaluate(y.normal, s, -l) * light.flux.as_dvec3() * geometry)
     }

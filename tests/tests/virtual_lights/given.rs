@@ -239,7 +239,7 @@ impl Pass for GivenLights {
     type Bindings = BufferPart;
 
     fn shape(context: &PlanContext<'_, Self>, _: &InputShapes<Self>) -> Result<OutputShapes<Self>, PortError> {
-        Ok(LightsOutShapes { lights: VirtualLightsShape { count: context.params.count, specular: true } })
+        Ok(LightsOutShapes { lights: VirtualLightsShape { count: context.params.count, specular: true, lobes: false } })
     }
 
     fn create(context: &CreateContext<'_, Self>) -> Result<Self, BuildError> {

@@ -27,7 +27,7 @@ fn scene() -> Scene {
 fn pick(gpu: &Gpu, scene: &Scene, count: u32, offset: u32, seed: u32) -> Picked {
     let _turn = turn();
     let text = format!(
-        r#"(passes: {{"rsm": rsm(resolution: {SIDE}), "lights": vpl_lights(count: {count}, seed: {offset})}}, output: "lights.lights")"#
+        r#"(passes: {{"rsm": rsm(resolution: {SIDE}), "density": flux_density(), "lights": vpl_lights(count: {count}, seed: {offset})}}, output: "lights.lights")"#
     );
     let runner = run(gpu, &text, scene, &Given::default(), &["rsm.rsm"], seed).unwrap();
     let parts = |name: &str| runner.read(gpu, name).unwrap();

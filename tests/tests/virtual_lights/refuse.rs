@@ -53,14 +53,16 @@ fn visibility_without_bounds_is_refused_in_mebibytes() {
 }
 
 #[test]
-fn maps_with_too_many_texels_are_refused() {
-    let text =
-        |resolution: u32| format!(r#"(passes: {{"rsm": rsm(resolution: {resolution}), "lights": vpl_lights()}}, output: "lights.lights")"#);
-    // One point and one spot light: seven faces.
-    let scene = Scene::load("builtin:spheres").unwrap();
-    assert!(plan(&text(2048), &scene, &[]).is_ok());
-    let refused = plan(&text(2200), &scene, &[]).err().unwrap().to_string();
-    assert!(refused.contains("texels") && refused.contains("lower the resolution"), "{refused}");
+fn a_density_of_another_map_is_refused() {
+    let text = |of: &str| {
+        format!(
+            r#"(passes: {{"rsm": rsm(resolution: 64), "small": rsm(resolution: 32), "density": flux_density(from: {{"rsm": "{of}.rsm"}}),
+            "lights": vpl_lights(from: {{"rsm": "rsm.rsm"}})}}, output: "lights.lights")"#
+        )
+    };
+    assert!(plan(&text("rsm"), &scene(), &[]).is_ok());
+    let refused = plan(&text("small"), &scene(), &[]).err().unwrap().to_string();
+    assert!(refused.contains("32 texels a side") && refused.contains("64") && refused.contains("same reflective shadow map"), "{refused}");
 }
 
 #[test]
@@ -68,7 +70,7 @@ fn without_lights_nothing_is_gathered_and_the_reason_is_given() {
     let mut scene = scene();
     scene.lights.clear();
     let text = r#"(passes: {
-        "gbuffer": gbuffer(), "rsm": rsm(), "lights": vpl_lights(), "visibility": visibility(), "indirect": vpl_gather(),
+        "gbuffer": gbuffer(), "rsm": rsm(), "density": flux_density(), "lights": vpl_lights(), "visibility": visibility(), "indirect": vpl_gather(),
         "sum": compose(from: {"terms": ["indirect.radiance"]}),
     }, output: "sum.radiance")"#;
     let plan = plan(text, &scene, &[]).unwrap();

@@ -17,10 +17,11 @@ fn brdf_of(row: &[f64; 16], distribution: Option<Distribution>) -> Brdf {
     Brdf { alpha: row[3], ..Brdf::new(base, row[7], 0.0, specular, distribution.unwrap_or(Distribution::Ggx)) }
 }
 
-/// How far specular_probability may be off: the estimate's terms are of the size 1 and rounded, `exp2` by 1.3e-6; their sum divides.
+/// How far specular_probability may be off: the estimate's specular part is rounded by up to 1e-5 of the larger reflectance; the whole divides.
 fn probability_error(brdf: &Brdf, n_dot_v: f64) -> f64 {
     let all = lobelia_lobes::luminance(brdf.albedo_estimate(n_dot_v.max(0.0)));
-    if all > 0.0 { (3e-6 / all).min(1.0) } else { 0.0 }
+    let larger = brdf.reflectance_normal.max_element().max(brdf.reflectance_grazing);
+    if all > 0.0 { (1e-5 * larger / all).min(1.0) } else { 0.0 }
 }
 
 /// How much a BRDF's density changes with the probability of its lobes, at the most: by the sum of both densities.

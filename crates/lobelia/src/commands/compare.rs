@@ -1,6 +1,8 @@
 use super::{
     SceneArguments, parse_size,
     reference::{Paths, growth_bar, parse_error, show_growth},
+    sequence,
+    sequence::{Expected, FlickerAgainst, OWN_SAMPLES, SequenceArguments},
 };
 use crate::{failure::Failure, files};
 use comfy_table::{CellAlignment, Table, presets};
@@ -32,6 +34,7 @@ use std::{
 Examples:
   lobelia compare graphs/indirect.ron graphs/indirect.ron:no-visibility --scene builtin:cornell-glossy --report out
   lobelia compare graphs/indirect.ron:vpl graphs/indirect.ron:interleaved --output indirect.radiance --paths one-bounce --report out
+  lobelia compare graphs/indirect.ron:vpl graphs/indirect.ron:interleaved --scene scenes/cornell-moving-light.ron --frames 12 --fps 12 --report out
   lobelia compare graphs/direct.ron --scene room.glb --reference truth.exr --size 640x360 --report out"
 )]
 pub struct Arguments {
@@ -47,6 +50,8 @@ pub struct Arguments {
     truth: TruthArguments,
     #[command(flatten)]
     shot: ShotArguments,
+    #[command(flatten)]
+    sequence: SequenceArguments,
     /// Folder for the report; made if it does not exist.
     #[arg(long, value_name = "DIR")]
     report: PathBuf,
@@ -130,17 +135,20 @@ impl ShotArguments {
 
     /// How a trial is run.
     pub fn trial(&self) -> TrialOptions {
-        TrialOptions { adapter: self.adapter.clone(), baseline: self.baseline, rounds: self.rounds, output: self.output.clone() }
+        TrialOptions { adapter: self.adapter.clone(), baseline: self.baseline, rounds: self.rounds, output: self.output.clone(), time: 0.0 }
     }
 }
 
 /// A reference, and what is known of its noise.
 pub struct Known {
     pub image: Image,
+    /// Of each value; empty where it is not known.
+    pub variance: Vec<[f32; 3]>,
     pub note: String,
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    arguments.sequence.check(&arguments.truth)?;
     make_folder(&arguments.report)?;
     let registry = lobelia::registry();
     let mut techniques = Vec::new();
@@ -150,7 +158,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     name_apart(&mut techniques);
     let scene = Session::load(&arguments.scene.scene, &arguments.scene.options())?;
     // Everything that can be wrong with the input is found before the long work.
-    let shot = arguments.shot.shot();
+    let shot = arguments.sequence.shot(arguments.shot.shot());
     scene.camera(shot.camera.as_deref()).map_err(lobelia::SessionError::from)?;
     let mut options = shot.plan_options();
     options.keep.extend(arguments.shot.output.clone());
@@ -162,11 +170,23 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             eprintln!("warning: {warning}");
         }
     }
-    let known = reference(&scene, &arguments.truth, &arguments.shot, arguments.quiet)?;
+    let start = arguments.scene.time;
+    if arguments.sequence.is_sequence() && !scene.traits().animated && !arguments.quiet {
+        eprintln!("warning: nothing moves in the scene; only --new-seeds makes its frames differ");
+    }
+    let (known, mut expected) =
+        sequence::references(&scene, start, &shot, &arguments.sequence, &arguments.truth, &arguments.shot, arguments.quiet)?;
+    let options = TrialOptions { time: start, ..arguments.shot.trial() };
     let bar = trial_bar(arguments.quiet);
-    let measured = trial::run(&scene, &techniques, &shot, &arguments.shot.trial(), &mut |step| show_trial(&bar, step, &shot))?;
+    let measured = trial::run(&scene, &techniques, &shot, &options, &mut |step| show_trial(&bar, step, &shot))?;
+    if arguments.sequence.is_sequence() && arguments.sequence.against() == FlickerAgainst::Own {
+        let many = Shot { samples: shot.samples.saturating_mul(OWN_SAMPLES), ..shot.clone() };
+        let once = TrialOptions { rounds: 1, ..options };
+        let own = trial::run(&scene, &techniques, &many, &once, &mut |step| show_trial(&bar, step, &many))?;
+        expected = Expected::Own(own.into_iter().map(|one| one.frames).collect());
+    }
     bar.finish_and_clear();
-    write(arguments, &scene, &known, &measured)
+    write(arguments, &scene, &known, &expected, &shot, &measured)
 }
 
 /// Techniques of the same name would be one row; later ones get a number.
@@ -200,7 +220,7 @@ pub fn reference(scene: &lobelia::scene::Scene, truth: &TruthArguments, shot: &S
                 format!("{}: it has {} x {} pixels, but --size is {} x {}", file.display(), size[0], size[1], shot.size[0], shot.size[1]);
             return Err(Failure::Input(what));
         }
-        return Ok(Known { image, note: format!("{}", file.display()) });
+        return Ok(Known { image, variance: Vec::new(), note: format!("{}", file.display()) });
     }
     let camera = scene.camera(shot.camera.as_deref()).map_err(lobelia::SessionError::from)?;
     let paths = truth.paths.with_depth(truth.depth);
@@ -212,7 +232,7 @@ pub fn reference(scene: &lobelia::scene::Scene, truth: &TruthArguments, shot: &S
     bar.finish_and_clear();
     let note =
         format!("path-traced ({paths}), {} samples per pixel, relative MSE of its own noise {:.1e}", found.samples, found.relative_noise);
-    Ok(Known { image: found.image, note })
+    Ok(Known { image: found.image, variance: found.variance, note })
 }
 
 /// The techniques' seed must not choose another reference.
@@ -231,7 +251,8 @@ pub fn trial_bar(quiet: bool) -> ProgressBar {
 pub fn show_trial(bar: &ProgressBar, step: &trial::TrialStep<'_>, shot: &Shot) -> bool {
     let within = step.step.pass.as_ref().map_or(0.0, |(_, done)| f64::from(*done));
     let samples = f64::from(shot.samples);
-    let done = step.done as f64 + (f64::from(step.step.sample) + within) / samples;
+    let of_frame = (f64::from(step.step.sample) + within) / samples;
+    let done = step.done as f64 + (f64::from(step.step.frame) + of_frame) / f64::from(shot.frames);
     bar.set_length(step.total as u64 * 1000);
     bar.set_position((done * 1000.0) as u64);
     let pass = step.step.pass.as_ref().map(|(name, _)| format!(", {name}")).unwrap_or_default();
@@ -280,13 +301,24 @@ fn map_picture(image: &Image, map: &[f32], low: f32, high: f32) -> Result<Pictur
 
 const MEBIBYTE: f64 = (1u64 << 20) as f64;
 
-fn write(arguments: &Arguments, scene: &lobelia::scene::Scene, known: &Known, measured: &[Measured]) -> Result<(), Failure> {
+fn write(
+    arguments: &Arguments,
+    scene: &lobelia::scene::Scene,
+    known: &Known,
+    expected: &Expected,
+    shot: &Shot,
+    measured: &[Measured],
+) -> Result<(), Failure> {
     let folder = &arguments.report;
     files::write_exr(&folder.join("reference.exr"), &known.image)?;
     let mut variants = Vec::new();
-    for one in measured {
+    for (index, one) in measured.iter().enumerate() {
         files::write_exr(&folder.join(format!("{}.exr", file_name(&one.name))), &one.image)?;
-        variants.push(variant(one, &measured[0], known)?);
+        let mut variant = variant(one, &measured[0], known)?;
+        if let Some(flicker) = sequence::temporal_error(expected, index, one)? {
+            variant.metrics.insert("temporal_error".to_owned(), flicker);
+        }
+        variants.push(variant);
     }
     let differences = measured[1..].iter().flat_map(|other| {
         trial::differences(&measured[0], other).into_iter().map(|difference| PassDifference {
@@ -300,7 +332,10 @@ fn write(arguments: &Arguments, scene: &lobelia::scene::Scene, known: &Known, me
     let comparison = Comparison {
         title: format!("{} on {}", measured.iter().map(|one| one.name.as_str()).collect::<Vec<_>>().join(", "), arguments.scene.scene),
         device: measured[0].device.clone(),
-        scene: facts(arguments, scene, known, measured),
+        scene: facts(arguments, scene, known, measured)
+            .into_iter()
+            .chain(sequence::fact(expected, arguments.scene.time, shot).map(|fact| ("sequence".to_owned(), fact)))
+            .collect(),
         command: std::iter::once("lobelia".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" "),
         reference: displayed(&known.image, &known.image)?,
         differences: differences.collect(),
@@ -405,9 +440,10 @@ fn facts(arguments: &Arguments, scene: &lobelia::scene::Scene, known: &Known, me
 fn print_table(comparison: &Comparison, measured: &[Measured], known: &Known) -> Result<(), Failure> {
     let mut table = Table::new();
     // What a terminal has room for; the page has all of them.
-    let names = ["relative_mse", "flip_hdr", "ssim", "fireflies"];
+    let names = ["relative_mse", "flip_hdr", "ssim", "fireflies", "temporal_error"];
+    let names: Vec<&str> = names.into_iter().filter(|name| comparison.variants.iter().any(|one| one.metrics.contains_key(*name))).collect();
     let mut header = vec!["technique".to_owned(), "device ms".to_owned(), "over the first".to_owned(), "MiB".to_owned()];
-    header.extend(names.map(str::to_owned));
+    header.extend(names.iter().map(|name| (*name).to_owned()));
     let columns = header.len();
     table.load_style(presets::NOTHING).set_header(header);
     for column in 1..columns {
@@ -425,5 +461,8 @@ fn print_table(comparison: &Comparison, measured: &[Measured], known: &Known) ->
     let mut out = std::io::stdout().lock();
     writeln!(out, "{table}")?;
     writeln!(out, "device: {}; reference: {}", comparison.device, known.note)?;
+    if let Some((_, sequence)) = comparison.scene.iter().find(|(name, _)| name == "sequence") {
+        writeln!(out, "sequence: {sequence}")?;
+    }
     Ok(())
 }

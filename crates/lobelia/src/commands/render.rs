@@ -24,7 +24,8 @@ Examples:
   lobelia render graphs/indirect.ron --scene builtin:cornell-glossy -o out.png
   lobelia render graphs/indirect.ron --scene room.glb --camera sofa --size 1280x720 --samples 16 -o out.exr
   lobelia render graphs/indirect.ron --variant no-visibility --set lights.count=4096 --save indirect.radiance=indirect.exr -o out.png
-  lobelia render graphs/direct.ron --scene box.glb --frames 50 --profile trace.json -o out.png")]
+  lobelia render graphs/direct.ron --scene box.glb --frames 50 --profile trace.json -o out.png
+  lobelia render graphs/progressive.ron --scene builtin:cornell-glossy --frames 256 --progressive -o out.png")]
 pub struct Arguments {
     #[command(flatten)]
     graph: GraphArguments,
@@ -45,6 +46,10 @@ pub struct Arguments {
     /// Run this many frames and write the last; animated scenes move on by 1/24 s each.
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     frames: u32,
+    /// Let frames be samples of one picture: each has random numbers and sub-pixel offsets of its own, and animations stand still. For graphs with a
+    /// `progressive` pass, which shows the mean of all frames.
+    #[arg(long)]
+    progressive: bool,
     /// Seed of everything random; equal seeds give equal pictures.
     #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     seed: u32,
@@ -88,6 +93,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         camera: arguments.camera.clone(),
         samples: arguments.samples,
         frames: arguments.frames,
+        progressive: arguments.progressive,
         seed: arguments.seed,
         keep: arguments.saves.iter().map(|(port, _)| port.clone()).collect(),
         specialise: !arguments.no_specialise,

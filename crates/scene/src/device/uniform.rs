@@ -71,6 +71,12 @@ impl ViewUniform {
             jitter,
         }
     }
+
+    /// What is the same in all frames of a camera that stands still: not the jitter and what depends on it, nor frame and seed.
+    pub(super) fn camera_only(&self) -> Self {
+        let (zero, jitter) = (Mat4::ZERO, Vec2::ZERO);
+        Self { clip_from_scene: zero, previous_clip_from_scene: zero, jitter, frame: 0, seed: 0, ..*self }
+    }
 }
 
 #[derive(Clone, Copy, Debug, ShaderType)]

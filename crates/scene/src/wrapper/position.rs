@@ -12,6 +12,8 @@ pub(crate) enum Step<'a> {
     Field(&'a str),
     /// A quoted string.
     Quoted(&'a str),
+    /// The field of that name that comes after so many others of it.
+    Nth(&'a str, usize),
 }
 
 /// Line and column, from 1, of the last step of `path` that is found, each after the step before it.
@@ -19,11 +21,17 @@ pub(crate) fn of(text: &str, path: &[Step<'_>]) -> (usize, usize) {
     let mut found = 0;
     let mut steps = path.iter();
     let mut step = steps.next();
+    let mut passed = 0;
     for token in tokens(text) {
         let written = &text[token.clone()];
+        let is_field = |field: &str| written == field && text[token.end..].trim_start().starts_with(':');
         let fits = match step {
             None => break,
-            Some(Step::Field(field)) => written == *field && text[token.end..].trim_start().starts_with(':'),
+            Some(Step::Field(field)) => is_field(field),
+            Some(Step::Nth(field, others)) => {
+                passed += usize::from(is_field(field));
+                is_field(field) && passed == others + 1
+            }
             Some(Step::Quoted(name)) => written.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')) == Some(name),
         };
         if fits {

@@ -190,3 +190,68 @@ fn wrapped_files() {
         assert!(error.contains(expected), "{error}");
     }
 }
+
+const MOVING: &str = r#"(
+    gltf: "builtin:cornell-glossy",
+    lights: {"bulb": point(position: (9, 9, 9), intensity: (1, 1, 1))},
+    light_motion: {
+        "spot": [
+            (seconds: 0, position: (0, 1, 0), direction: (0, -2, 0)),
+            (seconds: 2, position: (2, 1, 0), direction: (3, 0, 0)),
+        ],
+        "bulb": [(seconds: 1, position: (0, 1, 0)), (seconds: 3, position: (0, 3, 0))],
+    },
+)"#;
+
+#[test]
+fn lights_move_along_their_keys() {
+    let mut scene = load(MOVING).unwrap();
+    let traits = scene.traits();
+    assert!(traits.animated && traits.animation_seconds == 3.0);
+    assert!(scene.lights.iter().all(|light| light.animated));
+    let place = |scene: &Scene, name: &str| {
+        let light = scene.lights.iter().find(|light| light.name == name).unwrap();
+        (light.position, light.direction)
+    };
+    // The scene is loaded as it is at the start.
+    assert_eq!(place(&scene, "spot"), (DVec3::Y, DVec3::NEG_Y));
+    assert_eq!(place(&scene, "bulb").0, DVec3::Y);
+    let version = scene.geometry_version();
+    scene.set_time(1.0);
+    let (position, direction) = place(&scene, "spot");
+    assert!((position - DVec3::new(1.0, 1.0, 0.0)).length() < 1e-12);
+    assert!((direction - DVec3::new(1.0, -1.0, 0.0).normalize()).length() < 1e-12);
+    assert_eq!(place(&scene, "bulb").0, DVec3::Y);
+    assert_eq!(scene.geometry_version(), version + 1);
+    scene.set_time(1.0);
+    assert_eq!(scene.geometry_version(), version + 1);
+    scene.set_time(100.0);
+    assert_eq!((place(&scene, "spot").0, place(&scene, "bulb").0), (DVec3::new(2.0, 1.0, 0.0), DVec3::new(0.0, 3.0, 0.0)));
+}
+
+#[test]
+fn broken_motions_are_refused_where_they_stand() {
+    let text = |keys: &str| format!("(gltf: \"builtin:cornell-glossy\", light_motion: {{\n  \"spot\": [\n{keys}\n]}})");
+    let good = "    (seconds: 1, position: (0, 1, 0), direction: (0, -1, 0)),\n";
+    let refused_second = |key: &str, expected: &str| refused(&text(&format!("{good}    ({key})")), 4, 6, expected);
+    refused_second(
+        "seconds: 1, position: (0, 1, 0), direction: (0, -1, 0)",
+        "key 2: seconds is 1, but must be more than that of the key before, 1",
+    );
+    refused_second("seconds: -2, position: (0, 1, 0), direction: (0, -1, 0)", "seconds is -2, but must be finite and not negative");
+    refused_second("seconds: 2, position: (0, inf, 0), direction: (0, -1, 0)", "position is [0, inf, 0], but must be finite");
+    refused_second("seconds: 2, position: (0, 1, 0), direction: (0, 0, 0)", "direction is zero");
+    refused_second("seconds: 2, direction: (0, -1, 0)", "position must be given in every key or in none");
+    refused_second("seconds: 2, position: (0, 1, 0)", "direction must be given in every key or in none");
+    refused_second("seconds: 2", "position is missing, and a direction too");
+    refused_second("seconds: 2, position: (0, 1, 0), direction: (0, 1, 0)", "opposite to that of the key before");
+    refused(&text(""), 2, 3, "the motion of light `spot` has no key");
+    refused("(gltf: \"builtin:cornell-glossy\", light_motion: {\n\"spott\": []})", 2, 1, "no light is called `spott`");
+    let bulb =
+        "(gltf: \"builtin:cornell-glossy\", lights: {\"a\": point(position: (0, 1, 0), intensity: (1, 1, 1))},\nlight_motion: {\"a\": [";
+    refused(&format!("{bulb}(seconds: 0, direction: (1, 0, 0))]}})"), 2, 23, "a point light has none");
+    let far = text("(seconds: 0, position: (1e10, 0, 0))");
+    assert!(load(&far).unwrap_err().to_string().contains("light `spot` is at"), "{}", load(&far).unwrap_err());
+    // A word that is no field.
+    assert!(load(&text("(second: 0)")).unwrap_err().to_string().contains("did you mean `seconds`"));
+}

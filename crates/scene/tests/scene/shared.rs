@@ -121,3 +121,19 @@ fn a_moved_corner_is_noticed() {
     moved.instances[5].world_from_local.w_axis.x += 1e-4;
     same(&moved, &still);
 }
+
+#[test]
+fn the_light_of_the_hall_moves_without_a_change_of_its_file() {
+    let Some(scenes) = shared_scenes() else { return };
+    let text = include_bytes!("../../../../scenes/atrium-moving-light.ron");
+    let hall = std::fs::read(scenes.join("atrium/atrium.glb")).unwrap();
+    let mut scene = load_in(&folder(&[("moving.ron", text), ("atrium.glb", &hall)]), "moving.ron").unwrap();
+    let still = glb(&scenes, "atrium");
+    // It starts where the file has it.
+    assert!((scene.lights[0].position - still.lights[0].position).length() < 1e-6);
+    assert!((scene.lights[0].direction - still.lights[0].direction).length() < 1e-3);
+    assert_eq!((scene.lights[0].kind, scene.lights[0].intensity), (still.lights[0].kind, still.lights[0].intensity));
+    assert_eq!((scene.traits().animation_seconds, scene.traits().normal_maps), (2.0, true));
+    scene.set_time(1.5);
+    assert!((scene.lights[0].position - still.lights[0].position).length() > 1.0);
+}
