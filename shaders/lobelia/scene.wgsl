@@ -6,6 +6,9 @@ const LIGHT_POINT: u32 = 0u;
 const LIGHT_SPOT: u32 = 1u;
 const LIGHT_DIRECTIONAL: u32 = 2u;
 
+// Back faces emit as well.
+const MATERIAL_EMITS_BOTH_WAYS: u32 = 1u;
+
 struct View {
     clip_from_scene: mat4x4f,
     previous_clip_from_scene: mat4x4f,
@@ -59,6 +62,7 @@ struct Material {
     normal_scale: f32,
     // 0: opaque.
     alpha_cutoff: f32,
+    // MATERIAL_EMITS_BOTH_WAYS or 0.
     flags: u32,
 }
 

@@ -6,7 +6,7 @@
 #import lobelia::math::safe_normalize
 #import lobelia::octahedral::{octahedral_pack, octahedral_unpack}
 #import lobelia::packing::{pack_color, pack_shared_exponent, unpack_color, unpack_shared_exponent}
-#import lobelia::scene::Material
+#import lobelia::scene::{MATERIAL_EMITS_BOTH_WAYS, Material}
 
 struct Surface {
     // Shading normal, turned to the viewer.
@@ -95,7 +95,7 @@ struct MaterialTexels {
 }
 
 // A surface from its material, its texels, and the interpolated (not unit) normal and tangent. `to_viewer` need not be unit; `front` is
-// whether the viewer sees the front face, the one that emits. Surfaces are two-sided: both normals are turned so that the geometric one faces the
+// whether the viewer sees the front face, which emits; the back does so only if the material says. Surfaces are two-sided: both normals are turned so that the geometric one faces the
 // viewer. A zero normal becomes the direction to the viewer, a zero tangent takes the map's x and y away.
 fn material_surface(
     material: Material,
@@ -125,6 +125,7 @@ fn material_surface(
     surface.roughness = clamp(material.roughness * texels.metallic_roughness.g, 0.0, 1.0);
     surface.metallic = clamp(material.metallic * texels.metallic_roughness.b, 0.0, 1.0);
     surface.specular = material.specular;
-    surface.emissive = select(vec3f(0.0), material.emissive * texels.emissive.rgb, front);
+    let emits = front || (material.flags & MATERIAL_EMITS_BOTH_WAYS) != 0u;
+    surface.emissive = select(vec3f(0.0), material.emissive * texels.emissive.rgb, emits);
     return surface;
 }

@@ -46,6 +46,7 @@ pub fn modules() -> &'static [Source<'static>] {
         "lobe_similarity",
         "packing",
         "scene",
+        "area_light",
         "light",
         "surface",
         "brdf",

@@ -45,7 +45,7 @@ impl GraphArguments {
 /// A scene and the moment at which it is seen.
 #[derive(Args, Clone, Debug)]
 pub struct SceneArguments {
-    /// Scene: a .glb, .gltf or RON scene file, or builtin:NAME (cornell-glossy, cornell-diffuse, ring-caustic, spheres).
+    /// Scene: a .glb, .gltf or RON scene file, or builtin:NAME (cornell-glossy, cornell-diffuse, ring-caustic, area-lights, spheres).
     #[arg(long, value_name = "SCENE", default_value = "builtin:cornell-glossy")]
     pub scene: String,
     /// Normal distribution function of specular lobes, instead of the scene's own (ggx if it names none).

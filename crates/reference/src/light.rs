@@ -1,13 +1,13 @@
 //! Lights: how each is sampled from a point, and how likely a ray is to be that sample.
 
 use crate::{environment::Sky, geometry::Geometry, geometry::Segment, surface::Surfaces};
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use lobelia_lobes::{
     light::spot_falloff,
     luminance,
     sampling::{cone_pdf, sample_cone},
 };
-use lobelia_scene::{AreaShape, LightKind, Scene};
+use lobelia_scene::{AreaShape, LightKind, Scene, triangulate};
 use std::f64::consts::TAU;
 
 /// Light that arrives at a point from one direction.
@@ -25,9 +25,72 @@ pub struct LightSample {
     pub emitter: Option<usize>,
 }
 
+/// An [`AreaShape`] in the form that sampling wants.
+enum Shape {
+    Quad([f64; 2]),
+    Disk(f64),
+    Sphere(f64),
+    Polygon(Polygon),
+}
+
+/// A polygon and the triangles that cover it, with running sums of their areas.
+struct Polygon {
+    outline: Vec<DVec2>,
+    triangles: Vec<[DVec2; 3]>,
+    areas: Vec<f64>,
+}
+
+impl Polygon {
+    fn new(shape: &AreaShape) -> Self {
+        let corners = shape.outline().unwrap_or_default();
+        let outline: Vec<DVec2> = corners.iter().map(|corner| corner.as_dvec2()).collect();
+        let triangles: Vec<[DVec2; 3]> = triangulate(&corners).into_iter().map(|indices| indices.map(|index| outline[index])).collect();
+        let mut total = 0.0;
+        let sum = |[a, b, c]: &[DVec2; 3]| {
+            total += 0.5 * (*b - *a).perp_dot(*c - *a).abs();
+            total
+        };
+        let areas = triangles.iter().map(sum).collect();
+        Self { outline, triangles, areas }
+    }
+
+    fn area(&self) -> f64 {
+        self.areas.last().copied().unwrap_or(0.0)
+    }
+
+    fn sample(&self, [u, v]: [f64; 2]) -> DVec2 {
+        let target = u * self.area();
+        let index = self.areas.partition_point(|sum| *sum <= target).min(self.areas.len() - 1);
+        let before = if index > 0 { self.areas[index - 1] } else { 0.0 };
+        // What is left of the number after the choice is uniform again.
+        let root = ((target - before) / (self.areas[index] - before)).clamp(0.0, 1.0).sqrt();
+        let [a, b, c] = self.triangles[index];
+        a * (1.0 - root) + b * (root * (1.0 - v)) + c * (root * v)
+    }
+
+    fn contains(&self, at: DVec2) -> bool {
+        let edges = self.outline.iter().zip(self.outline.iter().cycle().skip(1));
+        let crossings = edges
+            .filter(|(from, to)| (from.y > at.y) != (to.y > at.y) && at.x < from.x + (at.y - from.y) / (to.y - from.y) * (to.x - from.x));
+        crossings.count() % 2 == 1
+    }
+}
+
+impl Shape {
+    fn new(shape: &AreaShape) -> Self {
+        match shape {
+            AreaShape::Quad { width, height } => Self::Quad([0.5 * f64::from(*width), 0.5 * f64::from(*height)]),
+            AreaShape::Disk { radius } => Self::Disk(f64::from(*radius)),
+            AreaShape::Sphere { radius } => Self::Sphere(f64::from(*radius)),
+            AreaShape::Polygon { .. } => Self::Polygon(Polygon::new(shape)),
+        }
+    }
+}
+
 /// A flat or round shape that emits.
 struct Emitter {
-    shape: AreaShape,
+    shape: Shape,
+    two_sided: bool,
     centre: DVec3,
     /// Local axes in scene space, their lengths included.
     axes: DMat3,
@@ -72,7 +135,8 @@ impl Lights {
                 let even = lengths.iter().all(|length| (length / lengths[0] - 1.0).abs() < 1e-6);
                 let square = axes.x_axis.dot(axes.y_axis).abs() + axes.x_axis.dot(axes.z_axis).abs() + axes.y_axis.dot(axes.z_axis).abs();
                 Emitter {
-                    shape: light.shape,
+                    shape: Shape::new(&light.shape),
+                    two_sided: light.two_sided,
                     centre: light.world_from_local.transform_point3(DVec3::ZERO) - origin,
                     axes,
                     inverse: axes.inverse(),
@@ -233,19 +297,21 @@ fn area(geometry: &Geometry, triangle: usize) -> f64 {
 }
 
 impl Emitter {
-    /// Local size: of a quad half its sides, else the radius.
-    fn half(&self) -> [f64; 2] {
-        match self.shape {
-            AreaShape::Quad { width, height } => [0.5 * f64::from(width), 0.5 * f64::from(height)],
-            AreaShape::Disk { radius } | AreaShape::Sphere { radius } => [f64::from(radius); 2],
+    /// Area of the flat shapes.
+    fn flat_area(&self) -> f64 {
+        let unit = self.axes.x_axis.cross(self.axes.y_axis).length();
+        unit * match &self.shape {
+            Shape::Quad([x, y]) => 4.0 * x * y,
+            Shape::Disk(radius) => std::f64::consts::PI * radius * radius,
+            Shape::Polygon(polygon) => polygon.area(),
+            Shape::Sphere(_) => 0.0,
         }
     }
 
-    /// Area of the flat shapes.
-    fn flat_area(&self) -> f64 {
-        let [x, y] = self.half();
-        let unit = self.axes.x_axis.cross(self.axes.y_axis).length();
-        unit * x * y * if matches!(self.shape, AreaShape::Quad { .. }) { 4.0 } else { std::f64::consts::PI }
+    /// Cosine between what a flat shape emits and a ray that meets it: positive where it is lit.
+    fn facing_cosine(&self, direction: DVec3) -> f64 {
+        let cosine = -self.facing().dot(direction);
+        if self.two_sided { cosine.abs() } else { cosine }
     }
 
     /// The direction that flat shapes emit to.
@@ -256,18 +322,18 @@ impl Emitter {
     }
 
     fn sample(&self, position: DVec3, [u, v]: [f64; 2]) -> Option<LightSample> {
-        let [half_x, half_y] = self.half();
-        let local = match self.shape {
-            AreaShape::Quad { .. } => DVec3::new((2.0 * u - 1.0) * half_x, (2.0 * v - 1.0) * half_y, 0.0),
-            AreaShape::Disk { .. } => {
-                let (radius, angle) = (half_x * u.sqrt(), TAU * v);
+        let local = match &self.shape {
+            Shape::Quad([half_x, half_y]) => DVec3::new((2.0 * u - 1.0) * half_x, (2.0 * v - 1.0) * half_y, 0.0),
+            Shape::Polygon(polygon) => polygon.sample([u, v]).extend(0.0),
+            Shape::Disk(radius) => {
+                let (radius, angle) = (radius * u.sqrt(), TAU * v);
                 DVec3::new(radius * angle.cos(), radius * angle.sin(), 0.0)
             }
-            AreaShape::Sphere { .. } if self.uniform_scale => return self.sample_ball(position, [u, v]),
-            AreaShape::Sphere { .. } => {
+            Shape::Sphere(radius) if self.uniform_scale => return self.sample_ball(*radius, position, [u, v]),
+            Shape::Sphere(radius) => {
                 let z = 1.0 - 2.0 * u;
                 let s = (1.0 - z * z).max(0.0).sqrt();
-                DVec3::new(s * (TAU * v).cos(), s * (TAU * v).sin(), z) * half_x
+                DVec3::new(s * (TAU * v).cos(), s * (TAU * v).sin(), z) * *radius
             }
         };
         let offset = self.centre + self.axes * local - position;
@@ -276,8 +342,8 @@ impl Emitter {
         let pdf = self.pdf(position, direction, distance);
         // The far side of an ellipsoid is hidden by its near side.
         let faces = match self.shape {
-            AreaShape::Sphere { .. } => (self.inverse.transpose() * local).dot(direction) < 0.0,
-            AreaShape::Quad { .. } | AreaShape::Disk { .. } => self.facing().dot(direction) < 0.0,
+            Shape::Sphere(_) => (self.inverse.transpose() * local).dot(direction) < 0.0,
+            _ => self.facing_cosine(direction) > 0.0,
         };
         (faces && pdf > 0.0 && pdf.is_finite()).then(|| LightSample {
             direction,
@@ -288,13 +354,9 @@ impl Emitter {
         })
     }
 
-    fn ball_radius(&self) -> f64 {
-        self.half()[0] * self.axes.x_axis.length()
-    }
-
     /// A direction in the cone that a sphere fills.
-    fn sample_ball(&self, position: DVec3, u: [f64; 2]) -> Option<LightSample> {
-        let (offset, radius) = (self.centre - position, self.ball_radius());
+    fn sample_ball(&self, local_radius: f64, position: DVec3, u: [f64; 2]) -> Option<LightSample> {
+        let (offset, radius) = (self.centre - position, local_radius * self.axes.x_axis.length());
         let squared = offset.length_squared();
         if squared <= radius * radius {
             return None;
@@ -311,21 +373,20 @@ impl Emitter {
 
     fn pdf(&self, position: DVec3, direction: DVec3, distance: f64) -> f64 {
         match self.shape {
-            AreaShape::Quad { .. } | AreaShape::Disk { .. } => {
-                let cosine = -self.facing().dot(direction);
+            Shape::Quad(_) | Shape::Disk(_) | Shape::Polygon(_) => {
+                let cosine = self.facing_cosine(direction);
                 if cosine <= 0.0 { 0.0 } else { distance * distance / (self.flat_area() * cosine) }
             }
-            AreaShape::Sphere { .. } if self.uniform_scale => {
+            Shape::Sphere(radius) if self.uniform_scale => {
                 let squared = (self.centre - position).length_squared();
-                let radius = self.ball_radius();
+                let radius = radius * self.axes.x_axis.length();
                 if squared <= radius * radius { 0.0 } else { cone_pdf(direction, one_minus_cosine(radius * radius / squared), direction) }
             }
-            AreaShape::Sphere { .. } => {
+            Shape::Sphere(radius) => {
                 // Uniform over the unit sphere; an area element grows by |det M| |M^-T n|.
                 let local = self.inverse * (position + direction * distance - self.centre);
                 let normal = self.inverse.transpose() * local.normalize_or(DVec3::Z);
                 let element = self.axes.determinant().abs() * normal.length();
-                let radius = self.half()[0];
                 let cosine = -normal.normalize_or(DVec3::Z).dot(direction);
                 if cosine <= 0.0 { 0.0 } else { distance * distance / (2.0 * TAU * radius * radius * element * cosine) }
             }
@@ -336,25 +397,25 @@ impl Emitter {
     fn intersect(&self, segment: &Segment) -> Option<(f64, bool)> {
         let origin = self.inverse * (segment.origin - self.centre);
         let direction = self.inverse * segment.direction;
-        let [half_x, half_y] = self.half();
-        match self.shape {
-            AreaShape::Quad { .. } | AreaShape::Disk { .. } => {
+        match &self.shape {
+            Shape::Quad(_) | Shape::Disk(_) | Shape::Polygon(_) => {
                 let distance = -origin.z / direction.z;
-                let at = origin + direction * distance;
-                let inside = if matches!(self.shape, AreaShape::Quad { .. }) {
-                    at.x.abs() <= half_x && at.y.abs() <= half_y
-                } else {
-                    at.x * at.x + at.y * at.y <= half_x * half_x
+                let at = (origin + direction * distance).truncate();
+                let inside = match &self.shape {
+                    Shape::Quad([half_x, half_y]) => at.x.abs() <= *half_x && at.y.abs() <= *half_y,
+                    Shape::Polygon(polygon) => polygon.contains(at),
+                    Shape::Disk(radius) | Shape::Sphere(radius) => at.length_squared() <= radius * radius,
                 };
-                (distance > 0.0 && distance < segment.reach && inside).then(|| (distance, self.facing().dot(segment.direction) < 0.0))
+                let met = distance > 0.0 && distance < segment.reach && inside;
+                met.then(|| (distance, self.facing_cosine(segment.direction) > 0.0))
             }
-            AreaShape::Sphere { .. } => {
+            Shape::Sphere(radius) => {
                 let a = direction.length_squared();
                 let b = origin.dot(direction);
-                let c = origin.length_squared() - half_x * half_x;
+                let c = origin.length_squared() - radius * radius;
                 // The discriminant from the nearest point to the centre, which does not cancel for small far spheres.
                 let nearest = origin - direction * (b / a);
-                let discriminant = a * (half_x * half_x - nearest.length_squared());
+                let discriminant = a * (radius * radius - nearest.length_squared());
                 if discriminant < 0.0 {
                     return None;
                 }

@@ -1,5 +1,7 @@
 //! Scenes made in code, so that nothing need be downloaded to start.
 
+mod area_lights;
+
 use crate::{Camera, Instance, LightKind, Material, Mesh, PunctualLight, Scene, SceneError, error::suggestion, gltf::area_light::sphere};
 use glam::{DMat4, DVec3, Vec3};
 use std::sync::Arc;
@@ -10,6 +12,7 @@ pub fn builtin_names() -> &'static [(&'static str, &'static str)] {
         ("cornell-glossy", "Cornell box, 2 m: metal floor, gold box, blue dielectric box, one spot light"),
         ("cornell-diffuse", "the same box with every surface Lambertian"),
         ("ring-caustic", "gold ring on a diffuse floor, one spot light: a glossy caustic"),
+        ("area-lights", "seven area lights, one of every shape, over a floor of strips of rising roughness"),
         ("spheres", "ten spheres of rising roughness, metal and dielectric, under a spot and a point light"),
     ]
 }
@@ -19,6 +22,7 @@ pub(crate) fn load(name: &str) -> Result<Scene, SceneError> {
         "cornell-glossy" => cornell(1.0),
         "cornell-diffuse" => cornell(0.0),
         "ring-caustic" => ring(),
+        "area-lights" => area_lights::area_lights(),
         "spheres" => spheres(),
         _ => {
             let known: Vec<&str> = builtin_names().iter().map(|(name, _)| *name).collect();

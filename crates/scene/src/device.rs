@@ -14,7 +14,7 @@ use bytemuck::{Pod, Zeroable};
 use encase::ShaderType;
 use material::{Materials, environment_view, material_layout};
 use std::{cell::Cell, sync::Arc};
-use uniform::{instance_bytes, light_bytes, view_bytes};
+use uniform::{area_light_bytes, instance_bytes, light_bytes, view_bytes};
 
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -43,6 +43,12 @@ pub struct GpuScene {
     pub lights: wgpu::Buffer,
     /// Number of lights.
     pub light_count: u32,
+    /// Storage array of area lights (`lobelia::area_light::AreaLight`), one element at least.
+    pub area_lights: wgpu::Buffer,
+    /// Storage array of `vec4f`: corners of flat lights in scene space, one element at least. They run counter-clockwise as seen from the side that emits.
+    pub area_light_vertices: wgpu::Buffer,
+    /// Number of area lights.
+    pub area_light_count: u32,
     /// Storage array of instances, indexed by `instance_index`.
     pub instances: wgpu::Buffer,
     /// Layout of material bind groups: 0 uniform material; 1 to 4 textures base colour, metallic-roughness, normal, emission; 5 to 8 their samplers.
@@ -91,6 +97,9 @@ impl GpuScene {
         let indices = buffer("indices", bytemuck::cast_slice(&index_data), wgpu::BufferUsages::INDEX)?;
         let view = buffer("view", &vec![0; ViewUniform::min_size().get() as usize], wgpu::BufferUsages::UNIFORM)?;
         let lights = buffer("lights", &light_bytes(&scene), wgpu::BufferUsages::STORAGE)?;
+        let (area_lights, area_light_vertices) = area_light_bytes(&scene);
+        let area_lights = buffer("area lights", &area_lights, wgpu::BufferUsages::STORAGE)?;
+        let area_light_vertices = buffer("corners of area lights", &area_light_vertices, wgpu::BufferUsages::STORAGE)?;
         let instances = buffer("instances", &instance_bytes(&scene), wgpu::BufferUsages::STORAGE)?;
         let material_layout = material_layout(device);
         let materials = Materials::new(device, queue, &scene).bind_groups(device, queue, &material_layout, &scene);
@@ -109,6 +118,9 @@ impl GpuScene {
             view,
             lights,
             light_count: scene.lights.len() as u32,
+            area_lights,
+            area_light_vertices,
+            area_light_count: scene.area_lights.len() as u32,
             instances,
             material_layout,
             environment: environment_view(device, queue, &scene),
@@ -140,6 +152,9 @@ impl GpuScene {
     /// Takes over a scene that [`Scene::set_time`] moved: instances and lights are written anew. It must be the same scene otherwise.
     pub fn update(&mut self, queue: &wgpu::Queue, scene: Arc<Scene>) {
         queue.write_buffer(&self.lights, 0, &light_bytes(&scene));
+        let (area_lights, area_light_vertices) = area_light_bytes(&scene);
+        queue.write_buffer(&self.area_lights, 0, &area_lights);
+        queue.write_buffer(&self.area_light_vertices, 0, &area_light_vertices);
         queue.write_buffer(&self.instances, 0, &instance_bytes(&scene));
         self.version.set(self.version.get() + 1);
         self.scene = scene;

@@ -10,9 +10,7 @@ mod open;
 mod primitive;
 mod tree;
 
-use crate::{
-    AlphaMode, AreaLight, Camera, Instance, LightKind, Material, Mesh, PunctualLight, Sampler, Scene, SceneError, TextureRef, Wrap, files,
-};
+use crate::{AlphaMode, Camera, Instance, LightKind, Material, Mesh, PunctualLight, Sampler, Scene, SceneError, TextureRef, Wrap, files};
 use accessor::Buffers;
 use base64::Engine;
 use glam::{DMat4, DVec3, Vec3};
@@ -225,12 +223,12 @@ impl Loader<'_> {
                 self.camera(&camera, place, &name)?;
             }
             if let Some(extras) = node.extras().as_ref() {
-                let light = area_light::parse(extras.get()).map_err(|message| self.fail(format!("node {index} (`{name}`): {message}")))?;
-                if let Some((shape, radiance)) = light {
+                let light = area_light::parse(extras.get(), &name, place);
+                if let Some(light) = light.map_err(|message| self.fail(format!("node {index} (`{name}`): {message}")))? {
                     if self.scene.area_lights.len() == MAX_AREA_LIGHTS {
                         return Err(self.fail(format!("it has more than {MAX_AREA_LIGHTS} area lights")));
                     }
-                    self.scene.area_lights.push(AreaLight { name, shape, world_from_local: DMat4::IDENTITY, radiance, node: Some(place) });
+                    self.scene.area_lights.push(light);
                 }
             }
         }

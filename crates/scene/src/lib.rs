@@ -57,7 +57,7 @@ mod wrapper;
 pub use builtin::builtin_names;
 pub use camera::Camera;
 pub use error::SceneError;
-pub use light::{AreaLight, AreaShape, Environment, LightKind, PunctualLight};
+pub use light::{AreaLight, AreaShape, Environment, LightKind, PunctualLight, triangulate};
 pub use material::{AlphaMode, MIN_ALPHA, Material, Sampler, Texture, TextureRef, Wrap};
 pub use mesh::{Mesh, Triangle};
 pub use ndf::Ndf;

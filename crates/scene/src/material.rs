@@ -19,6 +19,8 @@ pub struct Material {
     pub roughness: f32,
     /// Radiance leaving the front face, W/(sr m^2), strength included.
     pub emissive: Vec3,
+    /// Whether back faces emit as well.
+    pub emits_both_ways: bool,
     /// Scale of the specular lobe, [0, 1]. 1 in every glTF file; 0 makes a surface purely Lambertian, metals black.
     pub specular: f32,
     /// Scale of the normal map's x and y.
@@ -45,6 +47,7 @@ impl Default for Material {
             metallic: 1.0,
             roughness: 1.0,
             emissive: Vec3::ZERO,
+            emits_both_ways: false,
             specular: 1.0,
             normal_scale: 1.0,
             base_color_texture: None,

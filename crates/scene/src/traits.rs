@@ -89,6 +89,8 @@ pub struct SceneTraits {
     pub disk_lights: usize,
     /// Sphere lights.
     pub sphere_lights: usize,
+    /// Polygon lights other than quads.
+    pub polygon_lights: usize,
     /// Whether there is an environment map.
     pub environment: bool,
     /// Whether anything moves.
@@ -105,6 +107,16 @@ impl SceneTraits {
     /// Point, spot and directional lights.
     pub fn punctual_lights(&self) -> usize {
         self.point_lights + self.spot_lights + self.directional_lights
+    }
+
+    /// Area lights of all shapes.
+    pub fn area_lights(&self) -> usize {
+        self.flat_lights() + self.disk_lights + self.sphere_lights
+    }
+
+    /// Quad and polygon lights: those with corners.
+    pub fn flat_lights(&self) -> usize {
+        self.quad_lights + self.polygon_lights
     }
 
     /// The same scene with every fact set that only permits leaving something out.
@@ -148,6 +160,7 @@ impl SceneTraits {
             ("quad lights", self.quad_lights.to_string()),
             ("disk lights", self.disk_lights.to_string()),
             ("sphere lights", self.sphere_lights.to_string()),
+            ("polygon lights", self.polygon_lights.to_string()),
             ("environment map", yes(self.environment)),
             ("animation (s)", if self.animated { format!("{:.3}", self.animation_seconds) } else { "none".into() }),
             ("normal distribution", self.ndf.to_string()),
@@ -202,6 +215,7 @@ pub(crate) fn of(scene: &Scene) -> SceneTraits {
         quad_lights: area(|shape| matches!(shape, AreaShape::Quad { .. })),
         disk_lights: area(|shape| matches!(shape, AreaShape::Disk { .. })),
         sphere_lights: area(|shape| matches!(shape, AreaShape::Sphere { .. })),
+        polygon_lights: area(|shape| matches!(shape, AreaShape::Polygon { .. })),
         environment: scene.environment.is_some(),
         animated: scene.is_animated(),
         animation_seconds: scene.animation_seconds(),

@@ -420,14 +420,7 @@ fn facts(arguments: &Arguments, scene: &lobelia::scene::Scene, known: &Known, me
         ("camera", arguments.shot.camera.clone().unwrap_or_else(|| "the first".to_owned())),
         ("size", format!("{} x {} pixels, {} sub-pixel samples", size[0], size[1], arguments.shot.samples)),
         ("triangles", traits.triangles.to_string()),
-        (
-            "lights",
-            format!(
-                "{} without extent, {} with extent",
-                traits.punctual_lights(),
-                traits.quad_lights + traits.disk_lights + traits.sphere_lights
-            ),
-        ),
+        ("lights", format!("{} without extent, {} with extent", traits.punctual_lights(), traits.area_lights())),
         ("distribution of normals", scene.ndf.to_string()),
         ("reference", known.note.clone()),
         ("maps", "relative error from 0.1 % (black) to 100 % (yellow), logarithmic; FLIP (HDR) from 0 to 1".to_owned()),

@@ -186,7 +186,7 @@ fn check_kinds(arguments: &Arguments, plan: &Plan<SceneWorld>) -> Result<(), Fai
 
 /// Lights that no pass of the graph uses would leave a dark picture unexplained.
 fn warn_unlit(arguments: &Arguments, traits: &lobelia::scene::SceneTraits) {
-    let area = traits.quad_lights + traits.disk_lights + traits.sphere_lights;
+    let area = traits.area_lights();
     if area > 0 && traits.punctual_lights() == 0 && !arguments.quiet {
         eprintln!(
             "warning: the scene is lit by {area} area light(s) only, and no pass of this graph casts their light; they are drawn, but light nothing"

@@ -1,8 +1,8 @@
 //! What shaders read, laid out as `shaders/lobelia/scene.wgsl` says.
 
-use crate::{AlphaMode, Camera, LightKind, Material, Scene};
+use crate::{AlphaMode, AreaShape, Camera, LightKind, Material, Scene};
 use encase::{ShaderType, StorageBuffer, UniformBuffer};
-use glam::{DMat4, DVec3, DVec4, Mat4, Vec2, Vec3, Vec4};
+use glam::{DMat3, DMat4, DVec3, DVec4, Mat4, Vec2, Vec3, Vec4};
 
 /// The camera of one frame, as shaders see it.
 #[derive(Clone, Copy, Debug, PartialEq, ShaderType)]
@@ -90,6 +90,20 @@ struct LightUniform {
 }
 
 #[derive(Clone, Copy, Debug, ShaderType)]
+struct AreaLightUniform {
+    center: Vec3,
+    kind: u32,
+    axis_a: Vec3,
+    first_vertex: u32,
+    axis_b: Vec3,
+    vertex_count: u32,
+    axis_c: Vec3,
+    two_sided: u32,
+    radiance: Vec3,
+    padding: u32,
+}
+
+#[derive(Clone, Copy, Debug, ShaderType)]
 struct InstanceUniform {
     scene_from_local: Mat4,
     normal_column_x: Vec4,
@@ -148,6 +162,62 @@ pub(super) fn light_bytes(scene: &Scene) -> Vec<u8> {
     storage_bytes(&lights)
 }
 
+/// Records of the area lights, and the corners of their outlines, one element each at least.
+pub(super) fn area_light_bytes(scene: &Scene) -> (Vec<u8>, Vec<u8>) {
+    let origin = scene.origin();
+    let (mut lights, mut vertices) = (Vec::new(), Vec::new());
+    for light in &scene.area_lights {
+        let place = light.world_from_local;
+        let axes = DMat3::from_mat4(place);
+        let (kind, size) = match light.shape {
+            AreaShape::Quad { .. } | AreaShape::Polygon { .. } => (0, 1.0),
+            AreaShape::Disk { radius } => (1, f64::from(radius)),
+            AreaShape::Sphere { radius } => (2, f64::from(radius)),
+        };
+        let first_vertex = vertices.len() as u32;
+        let mut outline = light.shape.outline().unwrap_or_default();
+        if axes.determinant() < 0.0 {
+            // A mirrored light still emits towards where its local -Z is.
+            outline.reverse();
+        }
+        vertices.extend(outline.iter().map(|vertex| {
+            let world = place.transform_point3(vertex.as_dvec2().extend(0.0));
+            (world - origin).as_vec3().extend(0.0)
+        }));
+        lights.push(AreaLightUniform {
+            center: (place.transform_point3(DVec3::ZERO) - origin).as_vec3(),
+            kind,
+            axis_a: (axes.x_axis * size).as_vec3(),
+            first_vertex,
+            axis_b: (axes.y_axis * size).as_vec3(),
+            vertex_count: outline.len() as u32,
+            axis_c: (axes.z_axis * size).as_vec3(),
+            two_sided: u32::from(light.two_sided),
+            radiance: light.radiance,
+            padding: 0,
+        });
+    }
+    if lights.is_empty() {
+        let (zero, dark) = (Vec3::ZERO, 0);
+        lights.push(AreaLightUniform {
+            center: zero,
+            kind: dark,
+            axis_a: zero,
+            first_vertex: 0,
+            axis_b: zero,
+            vertex_count: 0,
+            axis_c: zero,
+            two_sided: 0,
+            radiance: zero,
+            padding: 0,
+        });
+    }
+    if vertices.is_empty() {
+        vertices.push(Vec4::ZERO);
+    }
+    (storage_bytes(&lights), storage_bytes(&vertices))
+}
+
 pub(super) fn instance_bytes(scene: &Scene) -> Vec<u8> {
     let scene_from_world = DMat4::from_translation(-scene.origin());
     let instances: Vec<InstanceUniform> = scene
@@ -191,7 +261,7 @@ pub(super) fn material_bytes(material: &Material) -> Vec<u8> {
             AlphaMode::Opaque => 0.0,
             AlphaMode::Mask { cutoff } => cutoff,
         },
-        flags: 0,
+        flags: u32::from(material.emits_both_ways),
     })
 }
 

@@ -1,7 +1,7 @@
 //! `extras.area_light` of a node, and the surface that such a light has.
 
-use crate::{AreaShape, Instance, Material, Mesh, Scene};
-use glam::{Vec2, Vec3};
+use crate::{AreaLight, AreaShape, Instance, Material, Mesh, Scene, light::polygon_fault, triangulate};
+use glam::{DMat4, Vec2, Vec3};
 use serde::Deserialize;
 use std::{f32::consts::PI, sync::Arc};
 
@@ -16,11 +16,14 @@ struct Written {
     width: Option<f32>,
     height: Option<f32>,
     radius: Option<f32>,
+    vertices: Option<Vec<[f32; 2]>>,
     radiance: [f32; 3],
+    #[serde(default)]
+    two_sided: bool,
 }
 
-/// Shape and radiance, if the extras hold an area light.
-pub(crate) fn parse(json: &str) -> Result<Option<(AreaShape, Vec3)>, String> {
+/// The area light at a node, if its extras hold one.
+pub(crate) fn parse(json: &str, name: &str, node: usize) -> Result<Option<AreaLight>, String> {
     // Other programs keep other things in extras.
     let value: serde_json::Value = serde_json::from_str(json).map_err(|error| format!("its extras are not JSON: {error}"))?;
     if value.get("area_light").is_none() {
@@ -37,22 +40,31 @@ pub(crate) fn parse(json: &str) -> Result<Option<(AreaShape, Vec3)>, String> {
         "quad" => AreaShape::Quad { width: length("width", light.width)?, height: length("height", light.height)? },
         "disk" => AreaShape::Disk { radius: length("radius", light.radius)? },
         "sphere" => AreaShape::Sphere { radius: length("radius", light.radius)? },
-        other => return Err(format!("extras.area_light: shape `{other}` is none of quad, disk, sphere")),
+        "polygon" => {
+            let written = light.vertices.ok_or("extras.area_light: a polygon needs `vertices`")?;
+            let vertices: Vec<Vec2> = written.into_iter().map(Vec2::from_array).collect();
+            if let Some(fault) = polygon_fault(&vertices) {
+                return Err(format!("extras.area_light: {fault}"));
+            }
+            AreaShape::Polygon { vertices }
+        }
+        other => return Err(format!("extras.area_light: shape `{other}` is none of quad, disk, sphere, polygon")),
     };
     let radiance = Vec3::from_array(light.radiance);
     if !radiance.is_finite() || radiance.min_element() < 0.0 {
         return Err(format!("extras.area_light: radiance is {radiance}, but must be finite and not negative"));
     }
-    Ok(Some((shape, radiance)))
+    let (name, world_from_local) = (name.to_owned(), DMat4::IDENTITY);
+    Ok(Some(AreaLight { name, shape, world_from_local, radiance, two_sided: light.two_sided, node: Some(node) }))
 }
 
 /// Adds the light's own surface: black, emitting on its front, which blocks light and is seen.
 pub(crate) fn add_surface(scene: &mut Scene, index: usize) {
     let light = scene.area_lights[index].clone();
-    let mut mesh = match light.shape {
-        AreaShape::Quad { width, height } => quad(width, height),
-        AreaShape::Disk { radius } => disk(radius),
-        AreaShape::Sphere { radius } => sphere(radius, 64, 32),
+    let mut mesh = match &light.shape {
+        AreaShape::Quad { .. } | AreaShape::Polygon { .. } => polygon(&light.shape.outline().unwrap_or_default()),
+        AreaShape::Disk { radius } => disk(*radius),
+        AreaShape::Sphere { radius } => sphere(*radius, 64, 32),
     };
     mesh.material = scene.materials.len();
     mesh.fill();
@@ -62,6 +74,7 @@ pub(crate) fn add_surface(scene: &mut Scene, index: usize) {
         metallic: 0.0,
         specular: 0.0,
         emissive: light.radiance,
+        emits_both_ways: light.two_sided,
         ..Material::default()
     });
     let meshes = Arc::make_mut(&mut scene.meshes);
@@ -77,14 +90,16 @@ pub(crate) fn add_surface(scene: &mut Scene, index: usize) {
 }
 
 /// Front towards -Z.
-fn quad(width: f32, height: f32) -> Mesh {
-    let (x, y) = (width / 2.0, height / 2.0);
-    Mesh {
-        positions: vec![Vec3::new(-x, -y, 0.0), Vec3::new(-x, y, 0.0), Vec3::new(x, y, 0.0), Vec3::new(x, -y, 0.0)],
-        normals: vec![Vec3::NEG_Z; 4],
-        indices: vec![0, 1, 2, 0, 2, 3],
-        ..Mesh::default()
+fn polygon(outline: &[Vec2]) -> Mesh {
+    let mut mesh = Mesh { positions: outline.iter().map(|vertex| vertex.extend(0.0)).collect(), ..Mesh::default() };
+    mesh.normals = vec![Vec3::NEG_Z; mesh.positions.len()];
+    for [a, b, c] in triangulate(outline) {
+        // A front face is counter-clockwise as seen from -Z.
+        let turned = (outline[b] - outline[a]).perp_dot(outline[c] - outline[a]) > 0.0;
+        let [b, c] = if turned { [c, b] } else { [b, c] };
+        mesh.indices.extend([a, b, c].map(|corner| corner as u32));
     }
+    mesh
 }
 
 /// Front towards -Z.

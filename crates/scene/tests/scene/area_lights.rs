@@ -47,6 +47,23 @@ fn a_quad_emits_towards_local_minus_z() {
     assert!(normals.iter().all(|normal| *normal == Vec3::NEG_Z));
 }
 
+/// A concave polygon is covered by its triangles whichever way around it is written, and its corners run counter-clockwise as seen from where it emits.
+#[test]
+fn a_polygon_emits_towards_local_minus_z() {
+    let mut corners = vec![[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [1.0, 0.5]];
+    for _ in 0..2 {
+        let scene = with(json!({"shape": "polygon", "vertices": corners, "radiance": [1, 2, 3], "two_sided": true})).load().unwrap();
+        let (vector, area, _) = surface(&scene);
+        assert!((vector - 1.5 * DVec3::Y).length() < 1e-5 && (area - 1.5).abs() < 1e-5, "{vector} {area}");
+        assert!(scene.area_lights[0].two_sided && scene.materials.last().unwrap().emits_both_ways);
+        let outline = scene.area_lights[0].shape.outline().unwrap();
+        let turned: f32 = (0..4).map(|index| outline[index].perp_dot(outline[(index + 1) % 4])).sum();
+        assert!((turned + 3.0).abs() < 1e-6, "twice the area, clockwise about +Z: {turned}");
+        assert_eq!((scene.traits().polygon_lights, scene.traits().area_lights()), (1, 1));
+        corners.reverse();
+    }
+}
+
 #[test]
 fn a_disk_has_the_area_of_a_disk() {
     let scene = with(json!({"shape": "disk", "radius": 0.5, "radiance": [1, 1, 1]})).load().unwrap();
@@ -85,8 +102,16 @@ fn broken_area_lights_are_refused() {
         (json!({"shape": "disk", "radius": 1e300, "radiance": [1, 1, 1]}), "`radius` is inf, but must be positive and finite"),
         (json!({"shape": "sphere", "radius": 1, "radiance": [1, -1, 1]}), "must be finite and not negative"),
         (json!({"shape": "sphere", "radius": 1, "radiance": [1, 1]}), "extras.area_light: invalid length 2"),
-        (json!({"shape": "cube", "radius": 1, "radiance": [1, 1, 1]}), "shape `cube` is none of quad, disk, sphere"),
+        (json!({"shape": "cube", "radius": 1, "radiance": [1, 1, 1]}), "shape `cube` is none of quad, disk, sphere, polygon"),
         (json!({"shape": "sphere", "radius": 1}), "missing field `radiance`"),
+        (json!({"shape": "polygon", "radiance": [1, 1, 1]}), "a polygon needs `vertices`"),
+        (json!({"shape": "polygon", "vertices": [[0, 0], [1, 0]], "radiance": [1, 1, 1]}), "has 2 corners"),
+        (json!({"shape": "polygon", "vertices": [[0, 0], [1, 0], [1, 0]], "radiance": [1, 1, 1]}), "`vertices[1]` and the next"),
+        (
+            json!({"shape": "polygon", "vertices": [[0, 0], [1, 1], [1, 0], [0, 1]], "radiance": [1, 1, 1]}),
+            "`vertices[0]` and from `vertices[2]` meet",
+        ),
+        (json!({"shape": "polygon", "vertices": [[0, 0], [1, 0], [2, 0]], "radiance": [1, 1, 1]}), "`vertices` has no area"),
         (json!(7), "extras.area_light"),
     ] {
         let error = with(light).error();
