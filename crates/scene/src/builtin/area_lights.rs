@@ -65,7 +65,7 @@ pub(super) fn area_lights() -> Scene {
         let two_sided = name == "star";
         build.scene.area_lights.push(AreaLight { name: name.into(), shape, world_from_local, radiance, two_sided, node: None });
     }
-    build.camera("main", [0.0, 2.1, 6.6], [0.0, 0.35, 0.4], 0.5);
+    build.camera("main", [0.0, 3.4, 7.2], [0.0, 0.05, 0.55], 0.52);
     build.camera("low", [0.0, 0.55, 5.4], [0.0, 0.35, 0.0], 0.62);
     let count = build.scene.area_lights.len();
     let mut scene = build.finish();
