@@ -15,6 +15,7 @@
 //! ```
 
 pub use lobelia_aism as aism;
+pub use lobelia_arealight_ltc_free as arealight_ltc_free;
 pub use lobelia_brsm as brsm;
 pub use lobelia_compose as compose;
 pub use lobelia_direct as direct;
@@ -52,6 +53,7 @@ pub fn registry() -> Registry<SceneWorld> {
     lobelia_rsm::register(&mut registry);
     lobelia_brsm::register(&mut registry);
     lobelia_direct::register(&mut registry);
+    lobelia_arealight_ltc_free::register(&mut registry);
     lobelia_vpl::register(&mut registry);
     lobelia_vsgl::register(&mut registry);
     lobelia_vsl::register(&mut registry);
@@ -60,4 +62,9 @@ pub fn registry() -> Registry<SceneWorld> {
     lobelia_compose::register(&mut registry);
     lobelia_progressive::register(&mut registry);
     registry
+}
+
+/// Whether passes of this kind cast the light of area lights.
+pub fn casts_area_light(kind: &str) -> bool {
+    ["area-light", "area-ltc", "area-mrp", "area-monte-carlo"].contains(&kind)
 }

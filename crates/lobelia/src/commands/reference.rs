@@ -146,13 +146,16 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         std::fs::remove_file(&checkpoint).map_err(|error| Failure::Run(format!("{}: {error}", checkpoint.display())))?;
     }
     if !arguments.quiet {
-        let error = picture.relative_noise().sqrt();
+        let error = match render.passes() {
+            // One pass has nothing to vary from.
+            0 | 1 => "error unknown: more than 16 samples are needed to estimate it".to_owned(),
+            _ => format!("estimated relative error {:.2} %", 100.0 * picture.relative_noise().sqrt()),
+        };
         writeln!(
             std::io::stdout(),
-            "wrote {} ({} samples per pixel, estimated relative error {:.2} %, {})",
+            "wrote {} ({} samples per pixel, {error}, {})",
             arguments.output.display(),
             picture.samples,
-            100.0 * error,
             paths
         )?;
         if picture.dropped > 0 {

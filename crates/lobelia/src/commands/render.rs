@@ -103,7 +103,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     scene.camera(shot.camera.as_deref()).map_err(lobelia::SessionError::from)?;
     let plan = wired.plan(&scene.traits(), &shot.plan_options())?;
     check_kinds(arguments, &plan)?;
-    warn_unlit(arguments, &scene.traits());
+    warn_unlit(arguments, &plan, &scene.traits());
     drop(plan);
 
     let gpu = lobelia::graph::Gpu::new(&lobelia::graph::GpuOptions { adapter: arguments.adapter.clone(), baseline: arguments.baseline })?;
@@ -185,8 +185,9 @@ fn check_kinds(arguments: &Arguments, plan: &Plan<SceneWorld>) -> Result<(), Fai
 }
 
 /// Lights that no pass of the graph uses would leave a dark picture unexplained.
-fn warn_unlit(arguments: &Arguments, traits: &lobelia::scene::SceneTraits) {
-    let area = traits.area_lights();
+fn warn_unlit(arguments: &Arguments, plan: &Plan<SceneWorld>, traits: &lobelia::scene::SceneTraits) {
+    let cast = plan.passes.iter().any(|pass| lobelia::casts_area_light(pass.kind_name()));
+    let area = if cast { return } else { traits.area_lights() };
     if area > 0 && traits.punctual_lights() == 0 && !arguments.quiet {
         eprintln!(
             "warning: the scene is lit by {area} area light(s) only, and no pass of this graph casts their light; they are drawn, but light nothing"
