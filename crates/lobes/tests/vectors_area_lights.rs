@@ -6,7 +6,7 @@ mod common;
 
 use common::{given, triple, vector};
 use glam::DVec3;
-use lobelia_lobes::area_light::{axial_moment::*, boundary::*, round::*};
+use lobelia_lobes::area_light::{axial_moment::*, boundary::*, half_vector::*, radial_primitive::*, round::*};
 use serde_json::Value;
 
 const BUILT_IN: &str = include_str!("data/area-lights.json");
@@ -86,5 +86,22 @@ fn vectors_disk_and_sphere() {
         let (normal, axis, n) = (vector(&r, "normal"), vector(&r, "axis"), given(&r, "n"));
         equal(axial_moment(&light, Some(normal), axis, n), given(&r, "M"), 1e-10, 1e3 / (n + 1.0), "M", &r);
         equal(solid_angle(&light, Some(normal)), given(&r, "solid_angle_above_normal"), 1e-10, 1e3, "solid angle", &r);
+    }
+}
+
+#[test]
+fn vectors_microfacet_lobes() {
+    for r in records("brdf") {
+        let parameter = given(&r, "param");
+        let microfacets = match r["model"].as_str().unwrap() {
+            "blinn" => Microfacets::Blinn { n: parameter },
+            "beckmann" => Microfacets::Beckmann { m: parameter },
+            "ggx" => Microfacets::Ggx { alpha: parameter },
+            other => panic!("model `{other}` in {r}"),
+        };
+        let light = Boundary::polygon(&polygon(&r));
+        let (normal, view) = (vector(&r, "normal"), vector(&r, "view"));
+        let found = half_vector_integral(&light, normal, view, microfacets, 64);
+        equal(found.whole, given(&r, "value"), 1e-9, 1e3, "microfacet lobe", &r);
     }
 }

@@ -151,13 +151,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             0 | 1 => "error unknown: more than 16 samples are needed to estimate it".to_owned(),
             _ => format!("estimated relative error {:.2} %", 100.0 * picture.relative_noise().sqrt()),
         };
-        writeln!(
-            std::io::stdout(),
-            "wrote {} ({} samples per pixel, {error}, {})",
-            arguments.output.display(),
-            picture.samples,
-            paths
-        )?;
+        writeln!(std::io::stdout(), "wrote {} ({} samples per pixel, {error}, {})", arguments.output.display(), picture.samples, paths)?;
         if picture.dropped > 0 {
             eprintln!("warning: {} samples were not finite and count as black", picture.dropped);
         }

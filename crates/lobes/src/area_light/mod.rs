@@ -7,6 +7,8 @@
 //!
 //! - [`boundary`]: outlines, made of straight edges and elliptical arcs, cut by planes through the shading point;
 //! - [`axial_moment`]: the exact moment for real exponents, and Arvo's recurrence for whole ones;
+//! - [`lambert`]: irradiance;
+//! - [`radial_primitive`] and [`half_vector`]: microfacet lobes, by the same integration in half vectors;
 //! - [`round`]: disks, spheres, ellipses and ellipsoids as ellipses, and as polygons of equal area.
 //!
 //! Conventions. The shading point is the origin. Outlines run counter-clockwise as seen from there; one that runs clockwise shows its back and its
@@ -17,4 +19,7 @@
 
 pub mod axial_moment;
 pub mod boundary;
+pub mod half_vector;
+pub mod lambert;
+pub mod radial_primitive;
 pub mod round;
