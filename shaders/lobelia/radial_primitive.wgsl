@@ -80,7 +80,6 @@ fn radial_primitive_beckmann(alpha: f32, om: f32, z: f32) -> RadialPrimitive {
     let u_over_om = (1.0 + z) / (m_squared * cosine * cosine);
     let u = min(u_over_om * om, 1e8);
     var primitive: RadialPrimitive;
-    primitive.along = (0.5 * INV_PI) * decay_mean(u) * u_over_om;
     var half_integral = 0.0;
     if u < 1.0 {
         // The closed form cancels here: five Gauss-Legendre nodes.
@@ -88,8 +87,10 @@ fn radial_primitive_beckmann(alpha: f32, om: f32, z: f32) -> RadialPrimitive {
             + 0.239314335 * (beckmann_integrand(m_squared, 0.230765345 * u) + beckmann_integrand(m_squared, 0.769234655 * u))
             + 0.284444444 * beckmann_integrand(m_squared, 0.5 * u);
         primitive.whole = (0.5 * INV_PI) * half_integral * u_over_om;
+        primitive.along = (0.5 * INV_PI) * decay_mean(u) * u_over_om;
     } else {
         let e = exp(-u);
+        primitive.along = (0.5 * INV_PI) * (1.0 - e) / om;
         half_integral = 1.0 - e / cosine + 0.886226925 * alpha * (scaled_erfc(1.0 / alpha) - e * scaled_erfc(1.0 / (alpha * cosine)));
         primitive.whole = (0.5 * INV_PI) * half_integral / om;
     }

@@ -7,7 +7,7 @@
 //!
 //! - [`boundary`]: outlines, made of straight edges and elliptical arcs, cut by planes through the shading point;
 //! - [`axial_moment`]: the exact moment for real exponents, and Arvo's recurrence for whole ones;
-//! - [`lambert`]: irradiance;
+//! - irradiance is in [`lambert`];
 //! - [`radial_primitive`] and [`half_vector`]: microfacet lobes, by the same integration in half vectors;
 //! - [`round`]: disks, spheres, ellipses and ellipsoids as ellipses, and as polygons of equal area.
 //!

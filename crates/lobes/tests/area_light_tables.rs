@@ -1,0 +1,68 @@
+//! Errors of the quadrature along outlines: the tables of docs/area-lights. `cargo test -p lobelia-lobes --test area_light_tables -- --nocapture` prints them.
+#![allow(clippy::unwrap_used)]
+
+use glam::DVec3;
+use lobelia_lobes::{
+    area_light::{boundary::Boundary, half_vector::half_vector_integral, radial_primitive::Microfacets},
+    sampling::{hash, unit_float},
+};
+
+struct Numbers(u32);
+
+impl Numbers {
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        self.0 += 1;
+        low + (high - low) * f64::from(unit_float(hash(self.0)))
+    }
+
+    fn vector(&mut self) -> DVec3 {
+        // Near enough to a normal distribution.
+        let mut component = || (0..6).map(|_| self.between(-1.0, 1.0)).sum::<f64>() / 2f64.sqrt();
+        DVec3::new(component(), component(), component())
+    }
+}
+
+/// A quad about the mirror direction, counter-clockwise as seen from the origin.
+fn quad(numbers: &mut Numbers, mirror: DVec3) -> Boundary {
+    let center = (mirror + numbers.vector() * 0.3).normalize() * numbers.between(0.5, 2.0);
+    let a = numbers.vector().normalize();
+    let b = a.cross(numbers.vector()).normalize();
+    let (a, b) = (a * 10f64.powf(numbers.between(-1.2, 0.3)), b * 10f64.powf(numbers.between(-1.2, 0.3)));
+    let mut corners = vec![center + a + b, center - a + b, center - a - b, center + a - b];
+    if a.cross(b).dot(center) > 0.0 {
+        corners.reverse();
+    }
+    Boundary::polygon(&corners)
+}
+
+/// Root mean square error over root mean square value, for GGX over 200 random quads.
+fn error(alpha: f64, degrees: f64, nodes: usize) -> f64 {
+    let angle = degrees.to_radians();
+    let view = DVec3::new(angle.sin(), 0.0, angle.cos());
+    let mut numbers = Numbers((1e6 * alpha) as u32 + degrees as u32 * 77_777);
+    let (mut squares, mut values) = (0.0, 0.0);
+    for _ in 0..200 {
+        let light = quad(&mut numbers, DVec3::new(-view.x, 0.0, view.z));
+        let of = |nodes| half_vector_integral(&light, DVec3::Z, view, Microfacets::Ggx { alpha }, nodes).whole;
+        let exact = of(48);
+        squares += (of(nodes) - exact).powi(2);
+        values += exact * exact;
+    }
+    f64::sqrt(squares / values)
+}
+
+#[test]
+fn nodes_of_the_half_vector_integral() {
+    println!("| alpha, view | 2 nodes | 3 | 4 | 6 |\n| --- | --- | --- | --- | --- |");
+    for alpha in [0.01, 0.05, 0.2, 0.4, 0.6] {
+        for degrees in [0.0, 45.0, 70.0, 85.0] {
+            let [two, three, four, six] = [2, 3, 4, 6].map(|nodes| error(alpha, degrees, nodes));
+            println!("| {alpha}, {degrees} | {two:.1e} | {three:.1e} | {four:.1e} | {six:.1e} |");
+            let steep = degrees > 80.0;
+            assert!(two < if steep { 0.06 } else { 0.04 }, "two nodes: {two}");
+            assert!(three < if steep { 0.02 } else { 0.005 }, "three nodes: {three}");
+            assert!(four < if steep { 0.01 } else { 2e-3 }, "four nodes: {four}");
+            assert!(six < if steep { 1e-3 } else { 1e-4 }, "six nodes: {six}");
+        }
+    }
+}
