@@ -78,7 +78,7 @@ fn radial_primitive_beckmann(alpha: f32, om: f32, z: f32) -> RadialPrimitive {
     let cosine = max(z, 1e-4);
     let m_squared = alpha * alpha;
     let u_over_om = (1.0 + z) / (m_squared * cosine * cosine);
-    let u = min(u_over_om * om, 1e8);
+    let u = u_over_om * om;
     var primitive: RadialPrimitive;
     var half_integral = 0.0;
     if u < 1.0 {
@@ -94,7 +94,7 @@ fn radial_primitive_beckmann(alpha: f32, om: f32, z: f32) -> RadialPrimitive {
         half_integral = 1.0 - e / cosine + 0.886226925 * alpha * (scaled_erfc(1.0 / alpha) - e * scaled_erfc(1.0 / (alpha * cosine)));
         primitive.whole = (0.5 * INV_PI) * half_integral / om;
     }
-    primitive.across = (0.5 * INV_PI) * gauss_rest(min(sqrt(u), 1e4)) / (m_squared * cosine * cosine * cosine);
+    primitive.across = (0.5 * INV_PI) * gauss_rest(sqrt(u)) / (m_squared * cosine * cosine * cosine);
     return primitive;
 }
 
