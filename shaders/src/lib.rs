@@ -54,6 +54,8 @@ pub fn modules() -> &'static [Source<'static>] {
         "radial_primitive",
         "light_outline",
         "half_vector_integral",
+        "edge_integral",
+        "axial_moment",
         "sampling",
         "direction_sampling",
         "tonemap",

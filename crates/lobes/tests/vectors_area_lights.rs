@@ -6,7 +6,10 @@ mod common;
 
 use common::{given, triple, vector};
 use glam::DVec3;
-use lobelia_lobes::area_light::{axial_moment::*, boundary::*, half_vector::*, radial_primitive::*, round::*};
+use lobelia_lobes::{
+    area_light::{axial_moment::*, boundary::*, edge_models::*, half_vector::*, radial_primitive::*, round::*},
+    cosine_lobe::*,
+};
 use serde_json::Value;
 
 const BUILT_IN: &str = include_str!("data/area-lights.json");
@@ -103,5 +106,58 @@ fn vectors_microfacet_lobes() {
         let (normal, view) = (vector(&r, "normal"), vector(&r, "view"));
         let found = half_vector_integral(&light, normal, view, microfacets, 64);
         equal(found.whole, given(&r, "value"), 1e-9, 1e3, "microfacet lobe", &r);
+    }
+}
+
+/// Every model against the exact moments. The bounds are the largest errors that the specification gives for its scenes and its grid of edges, times the number of
+/// edges that a reference outline has near its lobe.
+#[test]
+fn vectors_moment_by_edge_models() {
+    let models = [
+        (EdgeModel::Owen { nodes: 2 }, 5e-4),
+        (EdgeModel::Owen { nodes: 3 }, 5e-5),
+        (EdgeModel::Owen { nodes: 6 }, 2e-5),
+        (EdgeModel::Ellipsoid, 0.02),
+        (EdgeModel::LorentzianPearson, 0.02),
+        (EdgeModel::Lorentzian, 0.03),
+    ];
+    for (model, bound) in models {
+        let (mut worst, mut squares, mut count) = (0f64, 0.0, 0.0);
+        for r in records("moment") {
+            let light = Boundary::polygon(&polygon(&r));
+            let normal = r["clip_normal"].is_array().then(|| vector(&r, "clip_normal"));
+            let (axis, n) = (vector(&r, "axis"), given(&r, "n"));
+            let expected = lobe_fraction(given(&r, "M"), n);
+            let error = (lobe_fraction_model(model, &light, normal, axis, n) - expected).abs();
+            assert!(error <= bound, "{model:?}: off by {error:e} in {r}");
+            worst = worst.max(error);
+            squares += error * error;
+            count += 1.0;
+        }
+        println!("{model:?}: largest {worst:.1e}, root mean square {:.1e}", f64::sqrt(squares / count));
+    }
+}
+
+#[test]
+fn vectors_phong_two_axis() {
+    for r in records("phong_two_axis") {
+        let light = Boundary::polygon(&polygon(&r));
+        let (normal, view, n) = (vector(&r, "normal"), vector(&r, "view"), given(&r, "n"));
+        let axis = (normal * (2.0 * normal.dot(view)) - view).normalize();
+        let moment = two_axis_moment(&light, normal, axis, normal, n);
+        equal(moment, given(&r, "value_M"), 1e-10, 10.0 / (n + 1.0), "moment about two axes", &r);
+        equal(moment * (n + 2.0) / std::f64::consts::TAU, given(&r, "value"), 1e-10, 10.0, "two-axis lobe", &r);
+    }
+}
+
+#[test]
+fn vectors_lobe_product() {
+    for r in records("lobe_product") {
+        let first = CosineLobe { axis: vector(&r, "r1"), exponent: given(&r, "n1"), amplitude: given(&r, "mu1") };
+        let second = CosineLobe { axis: vector(&r, "r2"), exponent: given(&r, "n2"), amplitude: given(&r, "mu2") };
+        let product = cosine_lobe_product(&first, &second);
+        equal(product.exponent, given(&r, "n_p"), 1e-10, 1.0, "exponent of the product", &r);
+        equal(product.amplitude, given(&r, "mu_p"), 1e-9, 1e-5, "amplitude of the product", &r);
+        assert!((product.axis - triple(&r["r_p"])).length() < 1e-12, "axis of the product in {r}");
     }
 }

@@ -1,5 +1,6 @@
 //! Integrals over area lights on the device against `f64`.
 #![allow(clippy::unwrap_used)]
 
+mod cosine_lobes;
 mod half_vectors;
 mod outlines;

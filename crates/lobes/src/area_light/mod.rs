@@ -7,6 +7,7 @@
 //!
 //! - [`boundary`]: outlines, made of straight edges and elliptical arcs, cut by planes through the shading point;
 //! - [`axial_moment`]: the exact moment for real exponents, and Arvo's recurrence for whole ones;
+//! - [`edge_models`]: the same at a cost that does not depend on the exponent;
 //! - irradiance is in [`lambert`];
 //! - [`radial_primitive`] and [`half_vector`]: microfacet lobes, by the same integration in half vectors;
 //! - [`round`]: disks, spheres, ellipses and ellipsoids as ellipses, and as polygons of equal area.
@@ -19,6 +20,7 @@
 
 pub mod axial_moment;
 pub mod boundary;
+pub mod edge_models;
 pub mod half_vector;
 pub mod lambert;
 pub mod radial_primitive;
