@@ -186,8 +186,8 @@ fn edge_by_peak(s: f32, low: f32, high: f32, order: f32) -> f32 {
 #ifdef EDGE_ELLIPSOID
     let tangent = tan(half_width);
     // At 1 the peak is gone, and what is left of it rounding noise.
-    let a = clamp(tangent * tangent * share / (1.0 - share), 1e-12, 0.999);
-    let b = min(a * (2.1 - 1.28 * relative), 0.999);
+    let a = clamp(tangent * tangent * share / (1.0 - share), 1e-12, 0.99);
+    let b = min(a * (2.1 - 1.28 * relative), 0.99);
 #else
     let a = max((1.0 - share - 4.0 * half_width * half_width / 9.8696044) / (share * half_width * half_width), 1e-6);
     let b = 0.5 * a;

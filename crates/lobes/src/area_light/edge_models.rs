@@ -134,8 +134,8 @@ fn peak(model: EdgeModel, s: f64, low: f64, high: f64, order: f64) -> f64 {
     let half_width = FRAC_PI_4 * relative;
     let share = ((integrand(s, half_width, order) - 1.0) / (most - 1.0)).clamp(1e-6, 1.0 - 1e-6);
     let (a, b) = if model == EdgeModel::Ellipsoid {
-        let a = (half_width.tan().powi(2) * share / (1.0 - share)).clamp(1e-12, 0.999);
-        (a, (a * (2.1 - 1.28 * relative)).min(0.999))
+        let a = (half_width.tan().powi(2) * share / (1.0 - share)).clamp(1e-12, 0.99);
+        (a, (a * (2.1 - 1.28 * relative)).min(0.99))
     } else {
         let a = ((1.0 - share - 4.0 * half_width * half_width / (PI * PI)) / (share * half_width * half_width)).max(1e-6);
         (a, 0.5 * a)
