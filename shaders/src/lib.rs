@@ -54,6 +54,7 @@ pub fn modules() -> &'static [Source<'static>] {
         "radial_primitive",
         "light_outline",
         "half_vector_integral",
+        "area_light_outline",
         "edge_integral",
         "axial_moment",
         "sampling",

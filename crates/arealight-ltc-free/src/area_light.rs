@@ -21,8 +21,6 @@ pub enum Lobe {
     /// The microfacet lobe of the scene's materials: GGX, or Blinn-Phong where the scene's distribution is Phong.
     #[default]
     Scene,
-    /// The microfacet lobe with Beckmann's distribution.
-    Beckmann,
     /// A cosine lobe about the mirror direction.
     Phong,
     /// The same times the cosine to the normal.
@@ -31,7 +29,7 @@ pub enum Lobe {
 
 impl ParamValue for Lobe {
     fn kind() -> String {
-        "scene, beckmann, phong or phong_two_axis".into()
+        "scene, phong or phong_two_axis".into()
     }
 }
 
@@ -81,6 +79,18 @@ impl ParamValue for EdgeIntegral {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, lobelia_graph::Params)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
+    /// Which specular lobe: that of the scene's materials (`scene`), or a cosine lobe about the mirror direction as wide (`phong`), or that times the cosine to
+    /// the normal (`phong_two_axis`).
+    pub lobe: Lobe,
+    /// How a microfacet lobe is integrated: exactly (`exact_boundary`), or after Lecocq et al. 2017 with edges that are great arcs in half vectors (`vertices`,
+    /// `split`, `split_balanced`) and GGX as a mix of cosine lobes.
+    pub method: Method,
+    /// How a cosine lobe is integrated along an edge; nothing else has one. Largest error of an edge: 0.013 of the lobe for the peaks, 4e-5 for `owen` with 3
+    /// nodes.
+    pub edge: EdgeIntegral,
+    /// Quadrature nodes of `owen`. Root mean square error: 9e-5, 7e-6 and 3e-7 of the lobe with 2, 3 and 4 at an exponent of 100.
+    #[param(range = 2..=4)]
+    pub edge_nodes: u32,
     /// Quadrature nodes on either side of an edge's point nearest to the lobe. Relative error of the lobe up to 70 degrees from the normal: 2.5 %, 0.2 %, 0.05 %
     /// and 1e-5 with 2, 3, 4 and 6; at 85 degrees 4 %, 2 %, 0.3 % and 1e-4.
     #[param(range = 2..=6)]
@@ -92,7 +102,14 @@ pub struct Params {
 
 impl Default for Params {
     fn default() -> Self {
-        Self { boundary_nodes: 3, round_sides: 16 }
+        Self {
+            lobe: Lobe::Scene,
+            method: Method::ExactBoundary,
+            edge: EdgeIntegral::Owen,
+            edge_nodes: 3,
+            boundary_nodes: 3,
+            round_sides: 16,
+        }
     }
 }
 
@@ -142,8 +159,21 @@ impl Pass for AreaLightPass {
         found.push(Specialisation::new("POLYGON_LIGHTS", flat > 0, has(flat, "quad or polygon")));
         found.push(Specialisation::new("DISK_LIGHTS", disks > 0, has(disks, "disk")));
         found.push(Specialisation::new("SPHERE_LIGHTS", spheres > 0, has(spheres, "sphere")));
-        found.push(Specialisation::new("FLAT_LIGHTS", flat + disks > 0, has(flat + disks, "flat")));
-        found.push(Specialisation::new("ROUND_LIGHTS", disks + spheres > 0, has(disks + spheres, "round")));
+        let Params { lobe, method, edge, edge_nodes, .. } = *context.params;
+        let lobe_is = format!("lobe is {}", ["scene", "phong", "phong_two_axis"][lobe as usize]);
+        found.push(Specialisation::new("LOBE_COSINE", lobe != Lobe::Scene, lobe_is.clone()));
+        found.push(Specialisation::new("LOBE_TWO_AXIS", lobe == Lobe::PhongTwoAxis, lobe_is));
+        let method_is = format!("method is {}", ["exact_boundary", "vertices", "split", "split_balanced"][method as usize]);
+        let split = matches!(method, Method::Split | Method::SplitBalanced);
+        found.push(Specialisation::new("METHOD_GREAT_ARCS", method != Method::ExactBoundary, method_is.clone()));
+        found.push(Specialisation::new("METHOD_SPLIT", split, method_is.clone()));
+        found.push(Specialisation::new("METHOD_BALANCED", method == Method::SplitBalanced, method_is));
+        let edge_is = format!("edge is {}", ["lorentzian", "lorentzian_pearson", "ellipsoid", "owen"][edge as usize]);
+        found.push(Specialisation::new("EDGE_PEAK", edge != EdgeIntegral::Owen, edge_is.clone()));
+        found.push(Specialisation::new("EDGE_LORENTZIAN", edge == EdgeIntegral::Lorentzian, edge_is.clone()));
+        found.push(Specialisation::new("EDGE_ELLIPSOID", edge == EdgeIntegral::Ellipsoid, edge_is));
+        found.push(Specialisation::new("EDGE_NODES_TWO", edge_nodes == 2, format!("edge_nodes is {edge_nodes}")));
+        found.push(Specialisation::new("EDGE_NODES_FOUR", edge_nodes == 4, format!("edge_nodes is {edge_nodes}")));
         let nodes = context.params.boundary_nodes;
         for (flag, count) in [("HALF_VECTOR_NODES_TWO", 2), ("HALF_VECTOR_NODES_FOUR", 4), ("HALF_VECTOR_NODES_SIX", 6)] {
             found.push(Specialisation::new(flag, nodes == count, format!("boundary_nodes is {nodes}")));

@@ -1,10 +1,13 @@
 // Lights every pixel by all area lights: integrals along the outline of each light.
 
-#import lobelia::area_light::{AREA_LIGHT_DISK, AREA_LIGHT_POLYGON, AREA_LIGHT_SPHERE, AreaLight, area_light_facing}
-#import lobelia::brdf::{Brdf, brdf_from_surface, fresnel, ggx_visibility, phong_visibility}
+#import lobelia::area_light::AreaLight
+#import lobelia::area_light_outline::{Outline, SurfaceFrame, area_light_outline, outline_place, outline_rim_corner, surface_frame, to_frame}
+#import lobelia::axial_moment::{AxialMoment, add_moment_edge, add_power_edge, lobe_fraction, two_axis_moment}
+#import lobelia::brdf::{Brdf, brdf_from_surface, fresnel, ggx_visibility, phong_exponent, phong_visibility, specular_albedo}
+#import lobelia::cosine_lobe::cosine_lobe_evaluate
 #import lobelia::half_vector_integral::{HalfVectorSum, add_half_vector_edge}
-#import lobelia::light_outline::{GreatArc, OutlineStep, OutlineWalk, Rim, close_outline, great_arc, lambert_edge, rim_corner, rim_of_disk, rim_of_ellipsoid, walk_outline}
-#import lobelia::math::{perpendicular, safe_normalize, storable}
+#import lobelia::light_outline::{GreatArc, OutlineStep, OutlineWalk, close_outline, great_arc, lambert_edge, walk_outline}
+#import lobelia::math::{safe_normalize, storable}
 #import lobelia::scene::{View, scene_position}
 #import lobelia::surface::{PackedSurface, Surface, unpack_surface}
 
@@ -36,110 +39,223 @@ struct Settings {
 @group(0) @binding(9) var radiance: texture_storage_2d<rgba16float, write>;
 
 const MAX_FACTOR: f32 = 1e15;
+const INV_TAU: f32 = 0.159154943;
+const NORMAL: vec3f = vec3f(0.0, 0.0, 1.0);
 
-// The surface at a pixel, with the frame that its lobes are integrated in: z along the shading normal, the viewer in the half plane y = 0, x >= 0.
-struct Receiver {
-    position: vec3f,
-    axis_x: vec3f,
-    axis_y: vec3f,
-    normal: vec3f,
-    viewer: vec3f,
-    alpha: f32,
-}
-
-fn to_frame(receiver: Receiver, direction: vec3f) -> vec3f {
-    return vec3f(dot(direction, receiver.axis_x), dot(direction, receiver.axis_y), dot(direction, receiver.normal));
-}
-
-// A light's outline in the frame of the surface.
-struct Outline {
-    count: u32,
-    // First corner of a polygon, and whether its back is seen, from which its corners run the other way.
-    first: u32,
-    reversed: bool,
-    rim: Rim,
-}
-
-fn corner(outline: Outline, receiver: Receiver, index: u32) -> vec3f {
-    let place = select(index, outline.count - 1u - index, outline.reversed);
+fn corner(outline: Outline, frame: SurfaceFrame, index: u32) -> vec3f {
 #ifdef POLYGON_LIGHTS
-#ifdef ROUND_LIGHTS
-    if outline.first != 0xffffffffu {
-        return to_frame(receiver, corners[outline.first + place].xyz - receiver.position);
+    if !outline.round {
+        return to_frame(frame, corners[outline_place(outline, index)].xyz - frame.position);
     }
+#endif
+    return outline_rim_corner(outline, index);
+}
+
+// The specular lobe of a surface, and what of it the light fills; which fields are used depends on the lobe and the method.
+struct SpecularSum {
+    half_vectors: HalfVectorSum,
+    // Of a cosine lobe about the mirror direction; or of the lobes that stand for a microfacet distribution, about the normal in half vectors.
+    first: AxialMoment,
+    second: AxialMoment,
+    third: AxialMoment,
+    // Direction of the light that is nearest to the mirror direction, on the outline.
+    nearest: vec3f,
+    // Azimuth that the outline walks about the mirror direction.
+    around: AxialMoment,
+}
+
+fn mirror(viewer: vec3f) -> vec3f {
+    return vec3f(-viewer.x, 0.0, viewer.z);
+}
+
+#ifdef LOBE_COSINE
+// Phong's exponent falls off in angles of reflected rays as the distribution of the same alpha does in those of half vectors, which are half as large.
+fn exponent_of(alpha: f32) -> f32 {
+    return 0.25 * phong_exponent(alpha);
+}
+
+fn add_specular(sum: ptr<function, SpecularSum>, arc: GreatArc, viewer: vec3f, alpha: f32) {
+    let n = exponent_of(alpha);
+    var first = (*sum).first;
+#ifdef LOBE_TWO_AXIS
+    add_moment_edge(&first, arc, mirror(viewer), n + 1.0);
+    add_power_edge(&first, arc, mirror(viewer), n);
 #else
-    return to_frame(receiver, corners[outline.first + place].xyz - receiver.position);
+    add_moment_edge(&first, arc, mirror(viewer), n);
 #endif
+    (*sum).first = first;
+}
+
+fn reflected(brdf: Brdf, sum: SpecularSum, viewer: vec3f) -> vec3f {
+#ifdef LOBE_TWO_AXIS
+    let n = exponent_of(brdf.alpha);
+    let share = two_axis_moment(sum.first, mirror(viewer), NORMAL, n) * (n + 2.0) * INV_TAU;
+#else
+    let share = lobe_fraction(sum.first);
 #endif
-#ifdef ROUND_LIGHTS
-    return rim_corner(outline.rim, index, outline.count);
+    return specular_albedo(brdf, viewer.z) * share;
+}
+
+// One triangle of a small light that is above the horizon: its solid angle times the lobe, whose mean over the midpoints of the sides is exact for what is
+// quadratic across it. The sums along edges would cancel.
+fn small_triangle(brdf: Brdf, a: vec3f, b: vec3f, c: vec3f, viewer: vec3f) -> f32 {
+    let middle = (a + b + c) / 3.0;
+    let square = dot(middle, middle);
+    let solid_angle = -0.5 * dot(middle, cross(b - a, c - a)) * inverseSqrt(square) / square;
+    let n = exponent_of(brdf.alpha);
+    let first = small_value(n, normalize(a + b), viewer);
+    let second = small_value(n, normalize(b + c), viewer);
+    let third = small_value(n, normalize(c + a), viewer);
+    return solid_angle * (first + second + third) / 3.0;
+}
+
+fn small_value(n: f32, direction: vec3f, viewer: vec3f) -> f32 {
+    let lobe = cosine_lobe_evaluate(mirror(viewer), n, direction);
+#ifdef LOBE_TWO_AXIS
+    return (n + 2.0) * INV_TAU * lobe * max(direction.z, 0.0);
+#else
+    return (n + 1.0) * INV_TAU * lobe * step(0.0, direction.z);
+#endif
+}
+#else
+#ifdef METHOD_GREAT_ARCS
+// Lobes that stand for GGX: weights and exponents (Lecocq et al. 2017, equation 26, with its errata).
+struct LobeMix {
+    weights: vec3f,
+    exponents: vec3f,
+}
+
+fn lobe_mix(alpha: f32) -> LobeMix {
+    let n = phong_exponent(alpha);
+#ifdef NDF_PHONG
+    return LobeMix(vec3f(0.0, 1.0, 0.0), vec3f(0.0, n, 0.0));
+#else
+    let rest = (1.0 - alpha) * (1.0 + alpha);
+    return LobeMix(vec3f(alpha * alpha, 0.7 * rest, 0.3 * rest), vec3f(0.0, n, 0.1 * n));
 #endif
 }
 
-// No corners where nothing is seen: from behind a one-sided light, from its plane, from inside a sphere.
-fn outline_of(light: AreaLight, receiver: Receiver) -> Outline {
-    var outline: Outline;
-    let offset = light.center - receiver.position;
-    var front = true;
-#ifdef FLAT_LIGHTS
-    if light.kind != AREA_LIGHT_SPHERE {
-        let facing = safe_normalize(area_light_facing(light), vec3f(0.0));
-        let height = -dot(facing, offset);
-        // In its plane a light has no extent, and which side is seen is rounding noise.
-        front = height > 0.0;
-        if abs(height) <= 1e-6 * length(offset) || (!front && light.two_sided == 0u) {
-            return outline;
-        }
-    }
+fn add_half_arc(sum: ptr<function, SpecularSum>, start: vec3f, to: vec3f, mix: LobeMix) {
+    let arc = great_arc(start, to);
+    var first = (*sum).first;
+    var second = (*sum).second;
+    var third = (*sum).third;
+#ifndef NDF_PHONG
+    add_moment_edge(&first, arc, NORMAL, 0.0);
+    add_moment_edge(&third, arc, NORMAL, mix.exponents.z);
 #endif
-#ifdef POLYGON_LIGHTS
-    if light.kind == AREA_LIGHT_POLYGON {
-        outline.count = light.vertex_count;
-        outline.first = light.first_vertex;
-        outline.reversed = !front;
-        return outline;
-    }
-#endif
-#ifdef ROUND_LIGHTS
-    outline.first = 0xffffffffu;
-    let center = to_frame(receiver, offset);
-    let axis_a = to_frame(receiver, light.axis_a);
-    let axis_b = to_frame(receiver, light.axis_b);
-#ifdef DISK_LIGHTS
-    if light.kind == AREA_LIGHT_DISK {
-        outline.rim = rim_of_disk(center, axis_a, axis_b);
-        outline.count = settings.sides;
-    }
-#endif
-#ifdef SPHERE_LIGHTS
-    if light.kind == AREA_LIGHT_SPHERE {
-        outline.rim = rim_of_ellipsoid(center, mat3x3f(axis_a, axis_b, to_frame(receiver, light.axis_c)));
-        outline.count = select(0u, settings.sides, any(outline.rim.axis_a != vec3f(0.0)));
-    }
-#endif
-#endif
-    return outline;
+    add_moment_edge(&second, arc, NORMAL, mix.exponents.y);
+    (*sum).first = first;
+    (*sum).second = second;
+    (*sum).third = third;
 }
 
-// What the light of one outline, of radiance 1, becomes: x the integral of the cosine, and the microfacet lobe's.
-struct Lit {
-    cosine: f32,
-    lobe: HalfVectorSum,
+// An edge in half vectors as great arcs (algorithms 1 and 2).
+fn add_specular(sum: ptr<function, SpecularSum>, arc: GreatArc, viewer: vec3f, alpha: f32) {
+    let mix = lobe_mix(alpha);
+    let last = arc.start * cos(arc.length) + arc.tangent * sin(arc.length);
+    let ideal = mirror(viewer);
+    let foot = atan2(dot(ideal, arc.tangent), dot(ideal, arc.start));
+    // Which direction of the light everything else is evaluated at.
+    let place = clamp(foot, 0.0, arc.length);
+    let nearest = arc.start * cos(place) + arc.tangent * sin(place);
+    if dot(nearest, ideal) > dot((*sum).nearest, ideal) || all((*sum).nearest == vec3f(0.0)) {
+        (*sum).nearest = nearest;
+    }
+    var around = (*sum).around;
+    add_moment_edge(&around, arc, ideal, 0.0);
+    (*sum).around = around;
+#ifdef METHOD_SPLIT
+    if foot > 0.0 && foot < arc.length {
+        var split = nearest;
+#ifdef METHOD_BALANCED
+        let pull = min(2.0 * abs(dot(cross(arc.start, arc.tangent), viewer)) * alpha, 1.0);
+        split = normalize((1.0 - pull) * split + pull * normalize(arc.start + last));
+#endif
+        add_half_arc(sum, arc.start + viewer, split + viewer, mix);
+        add_half_arc(sum, split + viewer, last + viewer, mix);
+        return;
+    }
+#endif
+    add_half_arc(sum, arc.start + viewer, last + viewer, mix);
 }
 
-fn light_from(outline: Outline, receiver: Receiver) -> Lit {
-    var lit: Lit;
+fn reflected(brdf: Brdf, sum: SpecularSum, viewer: vec3f) -> vec3f {
+    let mix = lobe_mix(brdf.alpha);
+    let fractions = vec3f(lobe_fraction(sum.first), lobe_fraction(sum.second), lobe_fraction(sum.third));
+    let energy = dot(mix.weights * (mix.exponents + vec3f(2.0)) / (mix.exponents + vec3f(1.0)), fractions);
+    // The mirror direction if the light is there, else the direction of the outline that is nearest to it.
+    let light = select(sum.nearest, mirror(viewer), sum.around.walked > 3.14159265);
+    let h = safe_normalize(light + viewer, NORMAL);
+    return energy * reflected_at(brdf, h, viewer) * dot(h, viewer);
+}
+#else
+fn add_specular(sum: ptr<function, SpecularSum>, arc: GreatArc, viewer: vec3f, alpha: f32) {
+    var half_vectors = (*sum).half_vectors;
+    add_half_vector_edge(&half_vectors, arc, viewer, alpha);
+    (*sum).half_vectors = half_vectors;
+}
+
+// At the mean half vector that the lobe and the light have together; the factor h.v is exact.
+fn reflected(brdf: Brdf, sum: SpecularSum, viewer: vec3f) -> vec3f {
+    let energy = max(dot(sum.half_vectors.mean, viewer), 0.0);
+    return energy * reflected_at(brdf, safe_normalize(sum.half_vectors.mean, NORMAL), viewer);
+}
+#endif
+
+// F G2 / (n.v), which the lobe over half vectors is multiplied with beside h.v.
+fn reflected_at(brdf: Brdf, h: vec3f, viewer: vec3f) -> vec3f {
+    let cosine = clamp(dot(h, viewer), 0.0, 1.0);
+    // Of the viewer mirrored about the half vector.
+    let n_dot_l = max(2.0 * cosine * h.z - viewer.z, 1e-4);
+    let n_dot_v = max(viewer.z, 1e-4);
+#ifdef NDF_PHONG
+    let masking = phong_visibility(brdf.alpha, n_dot_l, n_dot_v);
+#else
+    let masking = ggx_visibility(brdf.alpha, n_dot_l, n_dot_v);
+#endif
+    return fresnel(brdf, cosine) * min(4.0 * masking * n_dot_l, MAX_FACTOR);
+}
+#endif
+
+#ifdef LOBE_COSINE
+// Whether the lobe hardly changes across the light, so that the sums along its edges would cancel.
+fn is_small(outline: Outline, frame: SurfaceFrame, alpha: f32) -> bool {
+    let first = corner(outline, frame, 0u);
+    var square = 0.0;
+    for (var index = 1u; index < outline.count; index++) {
+        let offset = corner(outline, frame, index) - first;
+        square = max(square, dot(offset, offset));
+    }
+    return square * (exponent_of(alpha) + 1.0) < 0.25 * dot(first, first);
+}
+
+fn reflected_from_small(brdf: Brdf, outline: Outline, frame: SurfaceFrame) -> vec3f {
+    let first = corner(outline, frame, 0u);
+    var previous = corner(outline, frame, 1u);
+    var sum = 0.0;
+    for (var index = 2u; index < outline.count; index++) {
+        let next = corner(outline, frame, index);
+        sum += small_triangle(brdf, first, previous, next, frame.viewer);
+        previous = next;
+    }
+    return specular_albedo(brdf, frame.viewer.z) * max(sum, 0.0);
+}
+#endif
+
+// Radiance that leaves towards the viewer for a light of radiance 1 within an outline.
+fn light_from(brdf: Brdf, outline: Outline, frame: SurfaceFrame) -> vec3f {
     if outline.count < 3u {
-        return lit;
+        return vec3f(0.0);
     }
-    // A pointer to a part of a variable cannot be handed on.
-    var lobe: HalfVectorSum;
+    var cosine = 0.0;
+    var specular: SpecularSum;
     var walk: OutlineWalk;
-    var previous = corner(outline, receiver, outline.count - 1u);
+    var previous = corner(outline, frame, outline.count - 1u);
     for (var index = 0u; index <= outline.count; index++) {
         var step: OutlineStep;
         if index < outline.count {
-            let next = corner(outline, receiver, index);
+            let next = corner(outline, frame, index);
             step = walk_outline(&walk, previous, next);
             previous = next;
         } else {
@@ -152,33 +268,25 @@ fn light_from(outline: Outline, receiver: Receiver) -> Lit {
                 continue;
             }
             let arc = great_arc(start, to);
-            lit.cosine += lambert_edge(arc);
+            if arc.length > 0.0 {
+                cosine += lambert_edge(arc);
 #ifdef SPECULAR
-            add_half_vector_edge(&lobe, arc, receiver.viewer, receiver.alpha);
+                add_specular(&specular, arc, frame.viewer, brdf.alpha);
 #endif
+            }
         }
     }
-    lit.lobe = lobe;
-    return lit;
-}
-
+    var sent = brdf.diffuse * max(cosine, 0.0);
 #ifdef SPECULAR
-// F G2 (h.v) / (n.v), which the lobe is multiplied with, at the mean half vector that the lobe and the light have together; the factor h.v is exact.
-fn reflected(brdf: Brdf, receiver: Receiver, lobe: HalfVectorSum) -> vec3f {
-    let mean = safe_normalize(lobe.mean, vec3f(0.0, 0.0, 1.0));
-    let cosine = clamp(dot(mean, receiver.viewer), 0.0, 1.0);
-    // Of the mirrored viewer about the mean half vector.
-    let n_dot_l = max(2.0 * cosine * mean.z - receiver.viewer.z, 1e-4);
-    let n_dot_v = max(receiver.viewer.z, 1e-4);
-#ifdef NDF_PHONG
-    let masking = phong_visibility(brdf.alpha, n_dot_l, n_dot_v);
-#else
-    let masking = ggx_visibility(brdf.alpha, n_dot_l, n_dot_v);
+#ifdef LOBE_COSINE
+    if is_small(outline, frame, brdf.alpha) {
+        return sent + reflected_from_small(brdf, outline, frame);
+    }
 #endif
-    let energy = max(dot(lobe.mean, receiver.viewer), 0.0);
-    return fresnel(brdf, cosine) * min(4.0 * masking * n_dot_l * energy, MAX_FACTOR);
+    sent += reflected(brdf, specular, frame.viewer);
+#endif
+    return sent;
 }
-#endif
 
 @compute @workgroup_size(8, 8)
 fn area_light(@builtin(global_invocation_id) id: vec3u) {
@@ -202,26 +310,14 @@ fn area_light(@builtin(global_invocation_id) id: vec3u) {
     let brdf = brdf_from_surface(surface);
     let position = scene_position(view, vec2f(id.xy), depth);
     let to_viewer = safe_normalize(view.position - position, surface.normal);
-    let height = dot(surface.normal, to_viewer);
-    // A shading normal that is turned away reflects nothing to the viewer.
     var total = vec3f(0.0);
-    if height > 0.0 {
-        var receiver: Receiver;
-        receiver.position = position;
-        receiver.normal = surface.normal;
-        receiver.axis_x = safe_normalize(to_viewer - surface.normal * height, perpendicular(surface.normal));
-        receiver.axis_y = cross(receiver.normal, receiver.axis_x);
-        receiver.viewer = to_frame(receiver, to_viewer);
-        receiver.viewer.y = 0.0;
-        receiver.alpha = brdf.alpha;
+    // A shading normal that is turned away reflects nothing to the viewer.
+    if dot(surface.normal, to_viewer) > 0.0 {
+        let frame = surface_frame(position, surface.normal, to_viewer);
         for (var index = 0u; index < settings.light_count; index++) {
             let light = lights[index];
-            let lit = light_from(outline_of(light, receiver), receiver);
-            var factor = brdf.diffuse * max(lit.cosine, 0.0);
-#ifdef SPECULAR
-            factor += reflected(brdf, receiver, lit.lobe);
-#endif
-            var sent = factor * min(light.radiance, vec3f(MAX_FACTOR));
+            let factor = light_from(brdf, area_light_outline(light, frame, settings.sides), frame);
+            var sent = min(factor, vec3f(MAX_FACTOR)) * min(light.radiance, vec3f(MAX_FACTOR));
 #ifdef VISIBILITY
             sent *= textureLoad(visible, id.xy, index, 0).x;
 #endif
