@@ -16,6 +16,7 @@
 
 pub use lobelia_aism as aism;
 pub use lobelia_arealight_ltc_free as arealight_ltc_free;
+pub use lobelia_arealight_peers as arealight_peers;
 pub use lobelia_brsm as brsm;
 pub use lobelia_compose as compose;
 pub use lobelia_direct as direct;
@@ -54,6 +55,7 @@ pub fn registry() -> Registry<SceneWorld> {
     lobelia_brsm::register(&mut registry);
     lobelia_direct::register(&mut registry);
     lobelia_arealight_ltc_free::register(&mut registry);
+    lobelia_arealight_peers::register(&mut registry);
     lobelia_vpl::register(&mut registry);
     lobelia_vsgl::register(&mut registry);
     lobelia_vsl::register(&mut registry);

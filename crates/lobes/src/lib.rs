@@ -9,6 +9,7 @@ pub mod averaged_direction;
 pub mod brdf;
 pub mod cosine_lobe;
 pub mod light;
+pub mod linearly_transformed_cosine;
 pub mod lobe_similarity;
 pub mod microfacet_lobe;
 pub mod octahedral;
