@@ -1,6 +1,6 @@
 //! The `area-light` pass.
 
-use lobelia_frame::{GBuffer, ImageShape, Radiance, SceneWorld};
+use lobelia_frame::{AreaLightVisibility, GBuffer, ImageShape, Radiance, SceneWorld};
 use lobelia_graph::{
     BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, ParamValue, Pass, PlanContext, PortError,
     Ports, RunError, Specialisation, TraitsOf,
@@ -118,6 +118,8 @@ impl Default for Params {
 pub struct Inputs {
     /// What the camera sees.
     pub gbuffer: GBuffer,
+    /// How much of every light is seen; without it nothing casts a shadow.
+    pub visibility: Option<AreaLightVisibility>,
 }
 
 /// Output ports.
@@ -151,6 +153,9 @@ impl Pass for AreaLightPass {
     fn specialise(context: &PlanContext<'_, Self>, inputs: &InputShapes<Self>) -> Vec<Specialisation> {
         let traits = context.traits;
         let mut found = inputs.gbuffer.flags.reflectance(traits.ndf);
+        let visibility = inputs.visibility.is_some();
+        let reason = if visibility { "visibility is connected" } else { "no visibility is connected" };
+        found.push(Specialisation::new("VISIBILITY", visibility, reason));
         let has = |count: usize, what: &str| match count {
             0 => format!("the scene has no {what} light: its code is dropped"),
             _ => format!("the scene has {count} {what} light(s)"),
@@ -185,6 +190,9 @@ impl Pass for AreaLightPass {
         if context.params.boundary_nodes == 5 {
             return Err(PortError::at("radiance", "boundary_nodes is 5, but must be 2, 3, 4 or 6"));
         }
+        if let Some(visibility) = &inputs.visibility {
+            visibility.check(inputs.gbuffer.extent)?;
+        }
         Ok(OutputsShapes { radiance: ImageShape { extent: inputs.gbuffer.extent } })
     }
 
@@ -217,6 +225,9 @@ impl Pass for AreaLightPass {
             .texture("radiance", &outputs.radiance.image);
         if context.world.traits.flat_lights() > 0 {
             bindings = bindings.raw_buffer("corners", &context.world.area_light_vertices);
+        }
+        if let Some(visibility) = &inputs.visibility {
+            bindings = bindings.texture("visible", &visibility.share);
         }
         Ok(Bindings { group: bindings.build(context.gpu)?, workgroups: self.pipeline.workgroups_2d(outputs.radiance.shape.extent) })
     }

@@ -2,7 +2,7 @@
 //! sends, and its settings.
 
 use crate::table::LtcTable;
-use lobelia_frame::{GBuffer, ImageShape, Radiance, SceneWorld};
+use lobelia_frame::{AreaLightVisibility, GBuffer, ImageShape, Radiance, SceneWorld};
 use lobelia_graph::{
     BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, Params, Pass, PlanContext, PortError,
     Ports, RunError, Specialisation, TraitsOf,
@@ -47,6 +47,8 @@ pub struct PeerPass<T> {
 pub struct Inputs {
     /// What the camera sees.
     pub gbuffer: GBuffer,
+    /// How much of every light is seen; without it nothing casts a shadow.
+    pub visibility: Option<AreaLightVisibility>,
 }
 
 /// Output ports.
@@ -107,6 +109,9 @@ impl<T: Technique> Pass for PeerPass<T> {
     fn specialise(context: &PlanContext<'_, Self>, inputs: &InputShapes<Self>) -> Vec<Specialisation> {
         let traits = context.traits;
         let mut found = inputs.gbuffer.flags.reflectance(traits.ndf);
+        let visibility = inputs.visibility.is_some();
+        let reason = if visibility { "visibility is connected" } else { "no visibility is connected" };
+        found.push(Specialisation::new("VISIBILITY", visibility, reason));
         let shapes = [
             ("POLYGON_LIGHTS", traits.flat_lights(), "quad or polygon"),
             ("DISK_LIGHTS", traits.disk_lights, "disk"),
@@ -127,6 +132,9 @@ impl<T: Technique> Pass for PeerPass<T> {
             && let Some(reason) = T::refuses(context.traits.ndf)
         {
             return Err(PortError::at("radiance", reason));
+        }
+        if let Some(visibility) = &inputs.visibility {
+            visibility.check(inputs.gbuffer.extent)?;
         }
         Ok(OutputsShapes { radiance: ImageShape { extent: inputs.gbuffer.extent } })
     }
@@ -179,6 +187,9 @@ impl<T: Technique> Pass for PeerPass<T> {
         }
         if let (Some(table), true) = (&self.table, gbuffer.specular.is_some()) {
             bindings = bindings.raw_buffer("table", table);
+        }
+        if let Some(visibility) = &inputs.visibility {
+            bindings = bindings.texture("visible", &visibility.share);
         }
         Ok(Bindings { group: bindings.build(context.gpu)?, workgroups: self.pipeline.workgroups_2d(outputs.radiance.shape.extent) })
     }

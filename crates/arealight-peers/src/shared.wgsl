@@ -30,6 +30,9 @@ struct Settings {
 #ifdef NORMAL_MAP
 @group(0) @binding(7) var gbuffer_geometric_normal: texture_2d<u32>;
 #endif
+#ifdef VISIBILITY
+@group(0) @binding(8) var visible: texture_2d_array<f32>;
+#endif
 @group(0) @binding(9) var radiance: texture_storage_2d<rgba16float, write>;
 
 const MAX_FACTOR: f32 = 1e15;
@@ -86,7 +89,11 @@ fn light_pixels(@builtin(global_invocation_id) id: vec3u) {
         let frame = surface_frame(position, surface.normal, to_viewer);
         for (var index = 0u; index < settings.light_count; index++) {
             let factor = light_from(index, brdf, frame, id.xy);
-            total = min(total + min(factor, vec3f(MAX_FACTOR)) * min(lights[index].radiance, vec3f(MAX_FACTOR)), vec3f(MAX_FACTOR));
+            var sent = min(factor, vec3f(MAX_FACTOR)) * min(lights[index].radiance, vec3f(MAX_FACTOR));
+#ifdef VISIBILITY
+            sent *= textureLoad(visible, id.xy, index, 0).x;
+#endif
+            total = min(total + sent, vec3f(MAX_FACTOR));
         }
     }
     textureStore(radiance, id.xy, vec4f(storable(total), 1.0));

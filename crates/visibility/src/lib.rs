@@ -1,4 +1,4 @@
-//! Which virtual lights each pixel sees, found by tracing shadow rays: exact, up to the scene's triangles.
+//! Which virtual lights each pixel sees, and how much of every area light, found by tracing shadow rays: exact, up to the scene's triangles.
 //!
 //! Imperfect shadow maps and their like approximate this; with exact visibility beside them, a technique's own error can be told from that of its
 //! shadows. A bounding volume hierarchy over the scene's triangles is built on the CPU (by the `obvhs` crate: PLOC with reinsertion) and laid out
@@ -9,9 +9,11 @@
 //!
 //! Triangles block from both sides; alpha masks are not looked at (a cut-out surface casts the shadow of the whole).
 
+mod area;
 mod hierarchy;
 mod visibility;
 
+pub use area::{AreaVisibilityParams, AreaVisibilityPass};
 pub use hierarchy::Hierarchy;
 pub use visibility::{Params, VisibilityPass};
 
@@ -21,4 +23,5 @@ use lobelia_graph::Registry;
 /// Adds the passes of this crate.
 pub fn register(registry: &mut Registry<SceneWorld>) {
     registry.add::<VisibilityPass>();
+    registry.add::<AreaVisibilityPass>();
 }
