@@ -14,8 +14,9 @@ pub struct MonteCarlo;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, lobelia_graph::Params)]
 #[serde(default, deny_unknown_fields)]
 pub struct MonteCarloParams {
-    /// Samples of each light for every pixel. The error falls a little faster than one over their root.
-    #[param(unit = "samples", range = 1..=65536)]
+    /// Samples of each light for every pixel, all in one dispatch, which bounds their number; for more, average frames (`--samples`). The error falls a little faster
+    /// than one over their root.
+    #[param(unit = "samples", range = 1..=256)]
     pub samples: u32,
     /// Added to the run's seed, to try other samples with everything else equal.
     pub seed: u32,

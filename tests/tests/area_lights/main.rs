@@ -2,5 +2,6 @@
 #![allow(clippy::unwrap_used)]
 
 mod cosine_lobes;
+mod crossing;
 mod half_vectors;
 mod outlines;

@@ -1,0 +1,114 @@
+//! Area lights as pictures: against path-traced references, and techniques against each other.
+#![allow(clippy::unwrap_used)]
+
+use lobelia::{
+    Shot,
+    measure::{Image, Mask, Statistics, compare, read_exr},
+    scene::Ndf,
+};
+use lobelia_tests::{Render, has_gpu, shared};
+
+fn render(scene: &str, extent: [u32; 2], samples: u32, ndf: Ndf, variants: &[&str], set: &[&str]) -> Image {
+    let shot = Shot { extent, samples, camera: Some("main".into()), ..Shot::default() };
+    Render { graph: "area-lights.ron", scene, variants, set, ndf, shot }.radiance("area.radiance").unwrap()
+}
+
+/// Pixels that see all of every light: shadows change nothing there. (A shadowed light takes its specular lobe with it in proportion, which is an approximation of the
+/// visibility, not of what is tested here.)
+fn lit(without: &Image, with: &Image) -> Mask {
+    let same = |(a, b): (&[f32; 3], &[f32; 3])| {
+        let (all, off) = (a.iter().sum::<f32>(), a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f32>());
+        all > 0.0 && off <= 1e-3 * all
+    };
+    Mask { counts: without.pixels.iter().zip(&with.pixels).map(same).collect() }
+}
+
+#[test]
+fn closer_to_the_reference_than_linearly_transformed_cosines() {
+    let Some(shared) = shared() else { return };
+    if !has_gpu() {
+        return;
+    }
+    for (name, most) in [("area-quad", 2.5e-3), ("area-disk-sphere", 6e-4)] {
+        let scene = shared.join(format!("scenes/{name}/{name}.glb")).display().to_string();
+        let reference = read_exr(&shared.join(format!("reference/{name}-main_direct.exr"))).unwrap();
+        let of = |variants: &[&str], set: &[&str]| render(&scene, [320, 180], 16, Ndf::Ggx, variants, set);
+        let ours = of(&["no-visibility"], &[]);
+        let mask = lit(&ours, &of(&[], &["visibility.samples=32"]));
+        let counted = mask.counts.iter().filter(|counts| **counts).count();
+        assert!(counted > mask.counts.len() / 8, "{name}: only {counted} pixels see every light whole");
+        let measure = |image: &Image| -> Statistics { compare(&reference, image, &mask).unwrap() };
+        let (ours, cosines) = (measure(&ours), measure(&of(&["no-visibility", "ltc"], &[])));
+        println!("{name}: {ours:?}, linearly transformed cosines {cosines:?}");
+        assert!(ours.relative_mse < most, "{name}: {ours:?}");
+        assert!((ours.mean_ratio - 1.0).abs() < 0.01, "{name}: {ours:?}");
+        assert!(5.0 * ours.relative_mse < cosines.relative_mse, "{name}: {ours:?} against {cosines:?}");
+    }
+}
+
+/// The nearer part of `builtin:area-lights`, of roughness 0.3 and more: samples that are uniform over the lights hardly ever meet a sharper lobe.
+fn rough(image: &Image) -> Mask {
+    Mask { counts: (0..image.pixels.len()).map(|pixel| pixel / image.width > image.height * 55 / 100).collect() }
+}
+
+/// Seven lights of all shapes, at 26 to 70 degrees. Monte Carlo knows nothing of outlines, and the others only share those.
+#[test]
+fn techniques_agree() {
+    if !has_gpu() {
+        return;
+    }
+    let scene = "builtin:area-lights";
+    let extent = [160, 90];
+    for ndf in [Ndf::Ggx, Ndf::Phong] {
+        let of = |variant: &str, set: &[&str]| render(scene, extent, 1, ndf, &["no-visibility", variant], set);
+        let samples = of("monte-carlo", &["area.samples=256"]);
+        let all = rough(&samples);
+        let against = |image: &Image| compare(&samples, image, &all).unwrap();
+        // A round light of 64 corners is round.
+        let ours = against(&of("exact-boundary", &["area.round_sides=64", "area.boundary_nodes=6"]));
+        // Masking and Fresnel at the mean half vector: 1.1 % too much here for GGX, 1.6 % too little for Phong.
+        let most = if ndf == Ndf::Ggx { 5e-4 } else { 4e-3 };
+        assert!(ours.relative_mse < most && (ours.mean_ratio - 1.0).abs() < 0.02, "{ndf:?}: {ours:?}");
+        let owen = against(&of("owen", &[]));
+        assert!(owen.relative_mse < 0.05 && owen.relative_mse > ours.relative_mse, "{ndf:?}, great arcs: {owen:?}");
+        let points = against(&of("mrp", &[]));
+        assert!(points.relative_mse < 0.3 && points.relative_mse > owen.relative_mse, "{ndf:?}, representative points: {points:?}");
+        if ndf == Ndf::Ggx {
+            let cosines = against(&of("ltc", &[]));
+            assert!(cosines.relative_mse < 0.01 && (cosines.mean_ratio - 1.0).abs() < 0.02, "linearly transformed cosines: {cosines:?}");
+        }
+        // What the comparison must reject: the cosine lobe is another lobe.
+        let other = against(&of("phong", &[]));
+        assert!(other.relative_mse > 4.0 * owen.relative_mse, "{ndf:?}, a cosine lobe: {other:?}");
+    }
+}
+
+#[test]
+fn seeds_and_samples_of_monte_carlo() {
+    if !has_gpu() {
+        return;
+    }
+    let of = |set: &[&str]| render("builtin:area-lights", [96, 54], 1, Ndf::Ggx, &["no-visibility", "monte-carlo"], set);
+    let base = of(&[]);
+    assert!(base.pixels == of(&[]).pixels, "equal seeds");
+    assert!(base.pixels != of(&["area.seed=1"]).pixels, "another seed");
+    let truth = of(&["area.samples=256"]);
+    let error = |image: &Image| compare(&truth, image, &rough(&truth)).unwrap().relative_mse;
+    let [few, many] = [error(&of(&["area.samples=4"])), error(&of(&["area.samples=32"]))];
+    assert!(few > 5.0 * many, "eight times as many samples: {few} to {many}");
+}
+
+#[test]
+fn what_cannot_be_asked_is_refused() {
+    if !has_gpu() {
+        return;
+    }
+    let ask = |ndf, variants: &[&str], set: &[&str]| {
+        let shot = Shot { extent: [16, 9], ..Shot::default() };
+        Render { graph: "area-lights.ron", scene: "builtin:area-lights", variants, set, ndf, shot }.radiance("area.radiance").unwrap_err()
+    };
+    assert!(ask(Ndf::Phong, &["ltc"], &[]).contains("fitted to GGX only"));
+    assert!(ask(Ndf::Ggx, &[], &["area.boundary_nodes=5"]).contains("must be 2, 3, 4 or 6"));
+    assert!(ask(Ndf::Ggx, &[], &["area.edge_nodes=9"]).contains("edge_nodes"));
+    assert!(ask(Ndf::Ggx, &["monte-carlo"], &["area.samples=0"]).contains("samples"));
+}

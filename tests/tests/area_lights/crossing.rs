@@ -1,0 +1,60 @@
+//! Lights that move through the horizon, through the lobe and onto the surface: nothing pops.
+
+use super::half_vectors::light_of;
+use glam::DVec3;
+
+const STEPS: usize = 200;
+
+/// A square of side 1 that faces the origin from `center`.
+fn square(center: DVec3) -> Vec<DVec3> {
+    let (a, b) = (DVec3::new(0.0, 0.5, 0.0), DVec3::new(0.0, 0.0, 0.5));
+    let corners = [center - a - b, center - a + b, center + a + b, center + a - b];
+    let mut corners: Vec<DVec3> = corners.map(|corner| corner.as_vec3().as_dvec3()).to_vec();
+    if (corners[1] - corners[0]).cross(corners[2] - corners[0]).dot(center) > 0.0 {
+        corners.reverse();
+    }
+    corners
+}
+
+fn largest_second_difference(values: &[f64]) -> f64 {
+    values.windows(3).map(|three| (three[2] - 2.0 * three[1] + three[0]).abs()).fold(0.0, f64::max)
+}
+
+fn path(view_degrees: f64, alpha: f64, at: impl Fn(f64) -> DVec3) -> Option<([Vec<f64>; 2], [Vec<f64>; 2])> {
+    let lights: Vec<Vec<DVec3>> = (0..=STEPS).map(|step| square(at(step as f64 / STEPS as f64))).collect();
+    light_of(&lights, view_degrees, alpha)
+}
+
+#[test]
+fn crossings_do_not_pop() {
+    // From below the horizon to above, through the mirror direction; along the horizon; towards the surface's own plane and point.
+    let paths: [(&str, fn(f64) -> DVec3); 3] = [
+        ("rising", |t| DVec3::new(-1.5, 0.1, -1.2 + 3.6 * t)),
+        ("passing", |t| DVec3::new(-1.0, -3.0 + 6.0 * t, 0.3)),
+        ("nearing", |t| DVec3::new(-2.0 * (1.0 - t) - 0.01, 0.05, 0.4)),
+    ];
+    for (name, at) in paths {
+        for view in [20.0, 60.0, 80.0] {
+            for alpha in [0.02, 0.1, 0.5] {
+                let Some((found, exact)) = path(view, alpha, at) else { return };
+                for (what, (found, exact)) in ["irradiance", "lobe"].into_iter().zip(found.iter().zip(&exact)) {
+                    let [own, true_one] = [found, exact].map(|values| largest_second_difference(values));
+                    // The quadrature may add a hundredth of the largest value, and no more than it is off by anywhere.
+                    let most = exact.iter().fold(0.0, |most: f64, value| most.max(*value));
+                    assert!(
+                        own <= 1.2 * true_one + 0.01 * most + 1e-5,
+                        "{name}, {view} degrees, alpha {alpha}: {what} jumps by {own}, the exact one by {true_one}"
+                    );
+                    let off = found.iter().zip(exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                    assert!(off < 0.03 * most + 1e-5, "{name}, {view} degrees, alpha {alpha}: {what} is off by {off} of {most}");
+                    assert!(most > 1e-4 || name == "passing", "{name}: nothing to see at {view} degrees, alpha {alpha}");
+                }
+            }
+        }
+    }
+    // What the bound must reject: one step that is off by a tenth of the whole.
+    let Some((mut found, exact)) = path(60.0, 0.1, paths[0].1) else { return };
+    let most = exact[1].iter().fold(0.0, |most: f64, value| most.max(*value));
+    found[1][120] += 0.1 * most;
+    assert!(largest_second_difference(&found[1]) > 1.2 * largest_second_difference(&exact[1]) + 0.01 * most + 1e-5);
+}
