@@ -1,4 +1,5 @@
-//! Chores of the workspace: `cargo xtask render`, `cargo xtask test`, `cargo xtask atlas`, `cargo xtask check-driver`.
+//! Chores of the workspace: `cargo xtask render`, `cargo xtask test`, `cargo xtask atlas`, `cargo xtask fit-ltc`,
+//! `cargo xtask check-driver`.
 //!
 //! Rendering and the tests need a Vulkan driver on Linux. A machine without a graphics card can use Mesa's software driver, which the
 //! chores offer to install.
@@ -27,6 +28,8 @@ Examples:
       Every test of the workspace.
   cargo xtask atlas
       The figures and tables of docs/lobes.
+  cargo xtask fit-ltc
+      The table of linearly transformed cosines, fitted anew in a minute or two.
   cargo xtask check-driver
       Say whether a Vulkan driver is there.
 
@@ -65,6 +68,12 @@ enum Chore {
         #[arg(last = true, value_name = "ARGUMENTS")]
         extra: Vec<OsString>,
     },
+    /// Fit linearly transformed cosines to the reflectance anew, to crates/arealight-peers/data/ltc-ggx.bin. Needs no device.
+    FitLtc {
+        /// Arguments for the fitting program; `-- --help` lists them. Paths are relative to the workspace root.
+        #[arg(last = true, value_name = "ARGUMENTS")]
+        extra: Vec<OsString>,
+    },
     /// Say whether a Vulkan loader and driver are there; exit code 1 if not. Installs nothing.
     CheckDriver,
 }
@@ -82,6 +91,7 @@ fn main() -> ExitCode {
         Chore::Render { consent, extra } => render(&consent, &extra),
         Chore::Test { consent } => test(&consent),
         Chore::Atlas { consent, extra } => atlas(&consent, &extra),
+        Chore::FitLtc { extra } => fit_ltc(&extra),
         Chore::CheckDriver => check_driver(),
     };
     outcome.unwrap_or_else(|message| {
@@ -122,6 +132,14 @@ fn atlas(consent: &Consent, extra: &[OsString]) -> Result<ExitCode, String> {
     ensure_driver(consent)?;
     let mut command = cargo(&workspace_root()?);
     command.args(["run", "-p", "lobelia-atlas", "--"]).args(extra);
+    run(&mut command).map(exit_code)
+}
+
+/// Fits the table; numbers only.
+fn fit_ltc(extra: &[OsString]) -> Result<ExitCode, String> {
+    let root = workspace_root()?;
+    let mut command = cargo(&root);
+    command.current_dir(&root).args(["run", "-p", "lobelia-fit-ltc", "--"]).args(extra);
     run(&mut command).map(exit_code)
 }
 
