@@ -179,8 +179,9 @@ fn edge_by_peak(s: f32, low: f32, high: f32, order: f32) -> f32 {
         return s * (high - low);
     }
     let widest = 0.785398163;
-    let reduced = max(c - c / max(order - 3.0, 1.0), 0.0);
-    let relative = pow(max(1.0 - pow(reduced, 2.5), 1e-12), 0.45);
+    // 1 less a power of nearly 1, from what is missing to 1.
+    let missing = min(s * s / (1.0 + c) + c / max(order - 3.0, 1.0), 0.99999994);
+    let relative = pow(max(-exp_minus_one(2.5 * log_one_plus(-missing)), 1e-12), 0.45);
     let half_width = widest * relative;
     let share = clamp((peak_integrand(s, half_width, order) - 1.0) / (most - 1.0), 1e-6, 1.0 - 1e-6);
 #ifdef EDGE_ELLIPSOID
@@ -189,7 +190,7 @@ fn edge_by_peak(s: f32, low: f32, high: f32, order: f32) -> f32 {
     let a = clamp(tangent * tangent * share / (1.0 - share), 1e-12, 0.99);
     let b = min(a * (2.1 - 1.28 * relative), 0.99);
 #else
-    let a = max((1.0 - share - 4.0 * half_width * half_width / 9.8696044) / (share * half_width * half_width), 1e-6);
+    let a = max((1.0 - share - 4.0 * half_width * half_width / 9.8696044) / (share * half_width * half_width), 0.04);
     let b = 0.5 * a;
 #endif
     let test = half_width + 0.3946 * widest * (1.0 - pow(1.0 - relative, 12.0));

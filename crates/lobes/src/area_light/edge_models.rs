@@ -129,15 +129,15 @@ fn peak(model: EdgeModel, s: f64, low: f64, high: f64, order: f64) -> f64 {
     if most < 1.0 + 1e-5 {
         return s * (high - low);
     }
-    let reduced = (c - c / (order - 3.0).max(1.0)).max(0.0);
-    let relative = (1.0 - reduced.powf(2.5)).max(1e-12).powf(0.45);
+    let missing = (s * s / (1.0 + c) + c / (order - 3.0).max(1.0)).min(1.0 - 1e-16);
+    let relative = (-(2.5 * (-missing).ln_1p()).exp_m1()).max(1e-12).powf(0.45);
     let half_width = FRAC_PI_4 * relative;
     let share = ((integrand(s, half_width, order) - 1.0) / (most - 1.0)).clamp(1e-6, 1.0 - 1e-6);
     let (a, b) = if model == EdgeModel::Ellipsoid {
         let a = (half_width.tan().powi(2) * share / (1.0 - share)).clamp(1e-12, 0.99);
         (a, (a * (2.1 - 1.28 * relative)).min(0.99))
     } else {
-        let a = ((1.0 - share - 4.0 * half_width * half_width / (PI * PI)) / (share * half_width * half_width)).max(1e-6);
+        let a = ((1.0 - share - 4.0 * half_width * half_width / (PI * PI)) / (share * half_width * half_width)).max(0.04);
         (a, 0.5 * a)
     };
     let test = half_width + 0.3946 * FRAC_PI_4 * (1.0 - (1.0 - relative).powi(12));
