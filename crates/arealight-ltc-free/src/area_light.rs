@@ -21,6 +21,8 @@ pub enum Lobe {
     /// The microfacet lobe of the scene's materials: GGX, or Blinn-Phong where the scene's distribution is Phong.
     #[default]
     Scene,
+    /// The same with Beckmann's distribution of the same alpha.
+    Beckmann,
     /// A cosine lobe about the mirror direction.
     Phong,
     /// The same times the cosine to the normal.
@@ -29,7 +31,7 @@ pub enum Lobe {
 
 impl ParamValue for Lobe {
     fn kind() -> String {
-        "scene, phong or phong_two_axis".into()
+        "scene, beckmann, phong or phong_two_axis".into()
     }
 }
 
@@ -79,7 +81,7 @@ impl ParamValue for EdgeIntegral {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, lobelia_graph::Params)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
-    /// Which specular lobe: that of the scene's materials (`scene`), or a cosine lobe about the mirror direction as wide (`phong`), or that times the cosine to
+    /// Which specular lobe: that of the scene's materials (`scene`), that with Beckmann's distribution (`beckmann`, by `exact_boundary` only), a cosine lobe about the mirror direction as wide (`phong`), or that times the cosine to
     /// the normal (`phong_two_axis`).
     pub lobe: Lobe,
     /// How a microfacet lobe is integrated: exactly (`exact_boundary`), or after Lecocq et al. 2017 with edges that are great arcs in half vectors (`vertices`,
@@ -165,8 +167,9 @@ impl Pass for AreaLightPass {
         found.push(Specialisation::new("DISK_LIGHTS", disks > 0, has(disks, "disk")));
         found.push(Specialisation::new("SPHERE_LIGHTS", spheres > 0, has(spheres, "sphere")));
         let Params { lobe, method, edge, edge_nodes, .. } = *context.params;
-        let lobe_is = format!("lobe is {}", ["scene", "phong", "phong_two_axis"][lobe as usize]);
-        found.push(Specialisation::new("LOBE_COSINE", lobe != Lobe::Scene, lobe_is.clone()));
+        let lobe_is = format!("lobe is {}", ["scene", "beckmann", "phong", "phong_two_axis"][lobe as usize]);
+        found.push(Specialisation::new("LOBE_COSINE", matches!(lobe, Lobe::Phong | Lobe::PhongTwoAxis), lobe_is.clone()));
+        found.push(Specialisation::new("NDF_BECKMANN", lobe == Lobe::Beckmann, lobe_is.clone()));
         found.push(Specialisation::new("LOBE_TWO_AXIS", lobe == Lobe::PhongTwoAxis, lobe_is));
         let method_is = format!("method is {}", ["exact_boundary", "vertices", "split", "split_balanced"][method as usize]);
         let split = matches!(method, Method::Split | Method::SplitBalanced);
@@ -187,6 +190,9 @@ impl Pass for AreaLightPass {
     }
 
     fn shape(context: &PlanContext<'_, Self>, inputs: &InputShapes<Self>) -> Result<OutputShapes<Self>, PortError> {
+        if context.params.lobe == Lobe::Beckmann && context.params.method != Method::ExactBoundary {
+            return Err(PortError::at("radiance", "lobe beckmann is integrated by method exact_boundary only"));
+        }
         if context.params.boundary_nodes == 5 {
             return Err(PortError::at("radiance", "boundary_nodes is 5, but must be 2, 3, 4 or 6"));
         }

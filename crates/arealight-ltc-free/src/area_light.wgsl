@@ -8,6 +8,7 @@
 #import lobelia::half_vector_integral::{HalfVectorSum, add_half_vector_edge}
 #import lobelia::light_outline::{GreatArc, OutlineStep, OutlineWalk, close_outline, great_arc, lambert_edge, walk_outline}
 #import lobelia::math::{safe_normalize, storable}
+#import lobelia::microfacet_lobe::beckmann_visibility
 #import lobelia::scene::{View, scene_position}
 #import lobelia::surface::{PackedSurface, Surface, unpack_surface}
 
@@ -209,10 +210,14 @@ fn reflected_at(brdf: Brdf, h: vec3f, viewer: vec3f) -> vec3f {
     // Of the viewer mirrored about the half vector.
     let n_dot_l = max(2.0 * cosine * h.z - viewer.z, 1e-4);
     let n_dot_v = max(viewer.z, 1e-4);
+#ifdef NDF_BECKMANN
+    let masking = beckmann_visibility(brdf.alpha, n_dot_l, n_dot_v);
+#else
 #ifdef NDF_PHONG
     let masking = phong_visibility(brdf.alpha, n_dot_l, n_dot_v);
 #else
     let masking = ggx_visibility(brdf.alpha, n_dot_l, n_dot_v);
+#endif
 #endif
     return fresnel(brdf, cosine) * min(4.0 * masking * n_dot_l, MAX_FACTOR);
 }

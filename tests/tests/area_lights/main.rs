@@ -5,3 +5,4 @@ mod cosine_lobes;
 mod crossing;
 mod half_vectors;
 mod outlines;
+mod round;
