@@ -99,7 +99,7 @@ fn main() {
         for (way, (_, function, flags, _)) in ways.iter().enumerate() {
             for (place, n) in EXPONENTS.iter().enumerate() {
                 let inputs: Vec<[f32; 4]> = rows.iter().map(|s| [*s, -0.9, 1.1, *n as f32 + 1.0]).collect();
-                let flags = flags.iter().fold(Flags::new(), |flags, flag| flags.with(*flag, true));
+                let flags = flags.iter().fold(Flags::new(), |flags, flag| flags.with(flag, true));
                 let clock = Instant::now();
                 let sums: Vec<[f32; 4]> = evaluate(gpu, &shader(function), &flags, &inputs).unwrap();
                 let seconds = clock.elapsed().as_secs_f64();

@@ -74,7 +74,7 @@ fn case(index: u32) -> Case {
 
 fn on_device(cases: &[Case], flags: &[&str]) -> Option<Vec<[f32; 4]>> {
     let inputs: Vec<Input> = cases.iter().map(|case| case.input).collect();
-    let flags = flags.iter().fold(Flags::new(), |flags, flag| flags.with(*flag, true));
+    let flags = flags.iter().fold(Flags::new(), |flags, flag| flags.with(flag, true));
     Some(evaluate(gpu()?, &format!("{WGSL}{WALK}"), &flags, &inputs).unwrap())
 }
 
