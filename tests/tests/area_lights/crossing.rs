@@ -1,6 +1,6 @@
 //! Lights that move through the horizon, through the lobe and onto the surface: nothing pops.
 
-use super::half_vectors::light_of;
+use super::half_vectors::{Track, light_of};
 use glam::DVec3;
 
 const STEPS: usize = 200;
@@ -20,7 +20,7 @@ fn largest_second_difference(values: &[f64]) -> f64 {
     values.windows(3).map(|three| (three[2] - 2.0 * three[1] + three[0]).abs()).fold(0.0, f64::max)
 }
 
-fn path(view_degrees: f64, alpha: f64, at: impl Fn(f64) -> DVec3) -> Option<([Vec<f64>; 2], [Vec<f64>; 2])> {
+fn path(view_degrees: f64, alpha: f64, at: impl Fn(f64) -> DVec3) -> Option<Track> {
     let lights: Vec<Vec<DVec3>> = (0..=STEPS).map(|step| square(at(step as f64 / STEPS as f64))).collect();
     light_of(&lights, view_degrees, alpha)
 }
@@ -28,7 +28,8 @@ fn path(view_degrees: f64, alpha: f64, at: impl Fn(f64) -> DVec3) -> Option<([Ve
 #[test]
 fn crossings_do_not_pop() {
     // From below the horizon to above, through the mirror direction; along the horizon; towards the surface's own plane and point.
-    let paths: [(&str, fn(f64) -> DVec3); 3] = [
+    type Path = fn(f64) -> DVec3;
+    let paths: [(&str, Path); 3] = [
         ("rising", |t| DVec3::new(-1.5, 0.1, -1.2 + 3.6 * t)),
         ("passing", |t| DVec3::new(-1.0, -3.0 + 6.0 * t, 0.3)),
         ("nearing", |t| DVec3::new(-2.0 * (1.0 - t) - 0.01, 0.05, 0.4)),
@@ -36,7 +37,7 @@ fn crossings_do_not_pop() {
     for (name, at) in paths {
         for view in [20.0, 60.0, 80.0] {
             for alpha in [0.02, 0.1, 0.5] {
-                let Some((found, exact)) = path(view, alpha, at) else { return };
+                let Some(Track { found, exact }) = path(view, alpha, at) else { return };
                 for (what, (found, exact)) in ["irradiance", "lobe"].into_iter().zip(found.iter().zip(&exact)) {
                     let [own, true_one] = [found, exact].map(|values| largest_second_difference(values));
                     // The quadrature may add a hundredth of the largest value, and no more than it is off by anywhere.
@@ -53,7 +54,7 @@ fn crossings_do_not_pop() {
         }
     }
     // What the bound must reject: one step that is off by a tenth of the whole.
-    let Some((mut found, exact)) = path(60.0, 0.1, paths[0].1) else { return };
+    let Some(Track { mut found, exact }) = path(60.0, 0.1, paths[0].1) else { return };
     let most = exact[1].iter().fold(0.0, |most: f64, value| most.max(*value));
     found[1][120] += 0.1 * most;
     assert!(largest_second_difference(&found[1]) > 1.2 * largest_second_difference(&exact[1]) + 0.01 * most + 1e-5);

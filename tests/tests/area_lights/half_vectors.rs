@@ -145,8 +145,15 @@ fn irradiance_holds_in_32_bits() {
     assert!(compare(&tilted, &found, 0.0, 5e-6).is_err(), "a normal that is off by 1e-4 must not pass");
 }
 
-/// Irradiance and lobe for lights seen from the origin: on the device with three nodes, and exact.
-pub fn light_of(lights: &[Vec<DVec3>], view_degrees: f64, alpha: f64) -> Option<([Vec<f64>; 2], [Vec<f64>; 2])> {
+/// Irradiance and lobe step by step.
+pub struct Track {
+    /// On the device with three nodes.
+    pub found: [Vec<f64>; 2],
+    pub exact: [Vec<f64>; 2],
+}
+
+/// For lights seen from the origin.
+pub fn light_of(lights: &[Vec<DVec3>], view_degrees: f64, alpha: f64) -> Option<Track> {
     let angle = view_degrees.to_radians();
     let view = DVec3::new(angle.sin(), 0.0, angle.cos()).as_vec3();
     let cases: Vec<Case> = lights
@@ -160,7 +167,7 @@ pub fn light_of(lights: &[Vec<DVec3>], view_degrees: f64, alpha: f64) -> Option<
         .collect();
     let found = on_device(&cases, &Flags::new())?;
     let exact = |case: &Case| half_vector_integral(&case.light, DVec3::Z, case.view, Microfacets::Ggx { alpha }, 48).whole;
-    let device = [found.iter().map(|(_, cosine)| *cosine).collect(), found.iter().map(|(sum, _)| sum.whole).collect()];
+    let device: [Vec<f64>; 2] = [found.iter().map(|(_, cosine)| *cosine).collect(), found.iter().map(|(sum, _)| sum.whole).collect()];
     let truth = [cases.iter().map(|case| irradiance(&case.light, DVec3::Z)).collect(), cases.iter().map(exact).collect()];
-    Some((device, truth))
+    Some(Track { found: device, exact: truth })
 }

@@ -41,7 +41,7 @@ impl Numbers {
 
     pub fn next(&mut self) -> f64 {
         self.1 += 1;
-        f64::from(unit_float(hash(self.0 ^ hash(self.1))))
+        unit_float(hash(self.0 ^ hash(self.1)))
     }
 
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
