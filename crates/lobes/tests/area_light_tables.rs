@@ -12,7 +12,7 @@ struct Numbers(u32);
 impl Numbers {
     fn between(&mut self, low: f64, high: f64) -> f64 {
         self.0 += 1;
-        low + (high - low) * f64::from(unit_float(hash(self.0)))
+        low + (high - low) * unit_float(hash(self.0))
     }
 
     fn vector(&mut self) -> DVec3 {
