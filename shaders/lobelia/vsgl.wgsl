@@ -1,5 +1,5 @@
 // What a virtual spherical Gaussian light sends to the viewer by way of a surface, in closed form: Tokuyoshi 2014 (`printed`), Tokuyoshi 2015 (`gaussian`) and two
-// forms of this project. `tests/tests/vsgl_limits.rs` holds them against the point light and, in `f64`, against a disk.
+// forms of this project. The twin in `f64` is `crates/lobes/src/vsgl.rs`; `tests/tests/vsgl_limits.rs` holds them against the point light and, in `f64`, against a disk.
 //
 // The light is a disk of radius r with a Lambertian and an SG lobe, the surface has a Lambertian and a glossy lobe. Radiance is a sum of four products,
 // each an integral over the cone in which the disk is seen, divided by pi r^2; written so that nothing divides by r^2, they tend to the point light's

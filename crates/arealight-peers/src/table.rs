@@ -126,7 +126,7 @@ mod tests {
     #[test]
     fn the_table_is_that_of_our_reflectance() {
         // Largest of the relative squared misfits of Heitz et al.'s lobe, whose shape is not that of GGX.
-        for (alpha, cosine, most) in [(0.01, 0.9, 0.02), (0.1, 0.9, 0.02), (0.3, 0.7, 0.02), (0.6, 0.5, 0.02), (0.2, 0.3, 0.06)] {
+        for (alpha, cosine, most) in [(0.01, 0.9, 0.02), (0.1, 0.9, 0.02), (0.3, 0.7, 0.02), (0.6, 0.5, 0.04), (0.2, 0.3, 0.06)] {
             let misfit = [1.0, 1.2].map(|stretch| misfit(alpha, cosine, stretch));
             assert!(misfit[0] < most, "alpha {alpha}, cosine {cosine}: {misfit:?}");
             assert!(misfit[1] > 1.3 * misfit[0], "a stretched lobe fits as well: {misfit:?}");

@@ -21,6 +21,7 @@ pub mod sg_light;
 pub mod special;
 pub mod specular_albedo;
 pub mod tonemap;
+pub mod vsgl;
 
 /// Relative luminance of linear Rec. 709 colour.
 pub fn luminance(color: glam::DVec3) -> f64 {

@@ -27,7 +27,7 @@ pub fn cone_slant(distance: f64, radius: f64) -> f64 {
 }
 
 /// `s = 2 h (h + distance)` with the slant h: `s / radius^2` is the sharpness of the cone.
-fn scaled_sharpness(distance: f64, radius: f64) -> f64 {
+pub fn cone_scaled_sharpness(distance: f64, radius: f64) -> f64 {
     let h = cone_slant(distance, radius);
     2.0 * h * (h + distance)
 }
@@ -110,7 +110,7 @@ struct ScaledProduct {
 }
 
 fn scaled_product(lobe_axis: DVec3, lobe_sharpness: f64, light_direction: DVec3, distance: f64, radius: f64) -> ScaledProduct {
-    let s = scaled_sharpness(distance, radius);
+    let s = cone_scaled_sharpness(distance, radius);
     let lobe = lobe_sharpness * radius * radius;
     let p = lobe_axis * lobe + light_direction * s;
     let (length, sum) = (p.length(), lobe + s);
@@ -192,7 +192,7 @@ pub fn combined_sharpness_bound(eta_x: f64, eta_y: f64, lobe_sharpness: f64) -> 
 /// Whether the cone is so small against the product of the lobes that the light may be taken for a point with their values in its direction
 /// times [`solid_angle_over_disk_area`]: `product_sharpness < threshold cone_sharpness`, without a division. A radius of 0 always passes.
 pub fn bias_reduction_applies(product_sharpness: f64, threshold: f64, distance: f64, radius: f64) -> bool {
-    product_sharpness * radius * radius < threshold * scaled_sharpness(distance, radius)
+    product_sharpness * radius * radius < threshold * cone_scaled_sharpness(distance, radius)
 }
 
 /// The product of ASG and lobe as a point: value of the ASG times the lobe in the light's direction times [`solid_angle_over_disk_area`],
