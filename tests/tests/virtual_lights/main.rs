@@ -5,6 +5,7 @@
 mod animated;
 mod gather;
 mod given;
+mod patches;
 mod pick;
 mod refuse;
 mod seen;
