@@ -2,6 +2,7 @@
 //!
 //! Every function that also exists in WGSL has the same name there; a device test (`tests/tests/twins.rs`) holds the two together over the whole domain.
 
+pub mod anisotropic_ggx;
 pub mod area_light;
 pub mod asg;
 pub mod asg_product;

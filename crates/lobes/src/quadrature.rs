@@ -17,6 +17,12 @@ pub(crate) fn rule() -> &'static [(f64, f64)] {
     })
 }
 
+/// Nodes and weights of the Gauss-Legendre rule of so many nodes, at least one, on [0, 1].
+pub(crate) fn gauss_legendre(nodes: usize) -> Vec<(f64, f64)> {
+    let rule = GaussLegendre::new(NonZeroUsize::new(nodes).unwrap_or(NonZeroUsize::MIN));
+    rule.iter().map(|(node, weight)| (0.5 + 0.5 * node, 0.5 * weight)).collect()
+}
+
 /// Integral of `f` over [low, high] by `panels` equal panels of twenty Gauss-Legendre points each.
 pub fn integrate(low: f64, high: f64, panels: usize, f: impl Fn(f64) -> f64) -> f64 {
     let width = (high - low) / panels as f64;

@@ -8,10 +8,9 @@ use super::{
     boundary::{Boundary, Piece},
     radial_primitive::{Microfacets, RadialPrimitive},
 };
-use crate::quadrature::integrate_adaptive;
-use gauss_quad::GaussLegendre;
+use crate::quadrature::{gauss_legendre, integrate_adaptive};
 use glam::{DVec2, DVec3};
-use std::{f64::consts::TAU, num::NonZeroUsize};
+use std::f64::consts::TAU;
 
 /// A microfacet lobe integrated over the half vectors of a light.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -94,8 +93,7 @@ pub fn half_vector_integral(light: &Boundary, normal: DVec3, view: DVec3, microf
     let axis_y = normal.cross(axis_x);
     let local = |v: DVec3| DVec3::new(v.dot(axis_x), v.dot(axis_y), v.dot(normal));
     let view = local(view);
-    let rule = GaussLegendre::new(NonZeroUsize::new(nodes).unwrap_or(NonZeroUsize::MIN));
-    let rule: Vec<(f64, f64)> = rule.iter().map(|(node, weight)| (0.5 + 0.5 * node, 0.5 * weight)).collect();
+    let rule = gauss_legendre(nodes);
     let mut sum = HalfVectorIntegral::default();
     for piece in &light.clip(normal).pieces {
         match *piece {

@@ -10,6 +10,7 @@
 //! - [`edge_models`]: the same at a cost that does not depend on the exponent;
 //! - irradiance is in [`lambert`];
 //! - [`radial_primitive`] and [`half_vector`]: microfacet lobes, by the same integration in half vectors;
+//! - [`ggx_half_vector`]: GGX, with one alpha or two, as the vector irradiance of stretched half vectors, which takes far fewer operations;
 //! - [`round`]: disks, spheres, ellipses and ellipsoids as ellipses, and as polygons of equal area.
 //!
 //! Conventions. The shading point is the origin. Outlines run counter-clockwise as seen from there; one that runs clockwise shows its back and its
@@ -20,7 +21,9 @@
 
 pub mod axial_moment;
 pub mod boundary;
+pub mod circular_arc;
 pub mod edge_models;
+pub mod ggx_half_vector;
 pub mod half_vector;
 pub mod lambert;
 pub mod radial_primitive;
