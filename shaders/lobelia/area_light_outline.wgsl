@@ -7,7 +7,7 @@
 #import lobelia::light_outline::{Rim, rim_corner, rim_of_disk, rim_of_ellipsoid}
 #import lobelia::math::{perpendicular, safe_normalize}
 
-// A surface with the frame that its lobes are integrated in: z along the shading normal, the viewer in the half plane y = 0, x >= 0.
+// A surface with the frame that its lobes are integrated in, z along the shading normal.
 struct SurfaceFrame {
     // Scene space.
     position: vec3f,
@@ -18,10 +18,20 @@ struct SurfaceFrame {
     viewer: vec3f,
 }
 
+// The viewer is in the half plane y = 0, x >= 0.
 fn surface_frame(position: vec3f, normal: vec3f, to_viewer: vec3f) -> SurfaceFrame {
     let height = dot(normal, to_viewer);
     let axis_x = safe_normalize(to_viewer - normal * height, perpendicular(normal));
     return SurfaceFrame(position, axis_x, cross(normal, axis_x), normal, vec3f(dot(to_viewer, axis_x), 0.0, height));
+}
+
+// x is the tangent: the part of a scene axis along the surface.
+fn surface_frame_along(position: vec3f, normal: vec3f, to_viewer: vec3f, axis: u32) -> SurfaceFrame {
+    var along = vec3f(0.0);
+    along[axis] = 1.0;
+    let axis_x = safe_normalize(along - normal * dot(along, normal), perpendicular(normal));
+    let axis_y = cross(normal, axis_x);
+    return SurfaceFrame(position, axis_x, axis_y, normal, vec3f(dot(to_viewer, axis_x), dot(to_viewer, axis_y), dot(to_viewer, normal)));
 }
 
 fn to_frame(frame: SurfaceFrame, direction: vec3f) -> vec3f {
@@ -34,10 +44,19 @@ struct Outline {
     // First corner of a polygon in the scene's array, and whether its back is seen, from which its corners run the other way.
     first: u32,
     reversed: bool,
-    // A round light has a rim instead.
+    // A round light has a rim instead; that of a sphere is seen as a circle.
     round: bool,
+    circle: bool,
     rim: Rim,
 }
+
+#ifdef SPHERE_LIGHTS
+fn is_sphere(light: AreaLight) -> bool {
+    let lengths = vec3f(dot(light.axis_a, light.axis_a), dot(light.axis_b, light.axis_b), dot(light.axis_c, light.axis_c));
+    let products = vec3f(dot(light.axis_a, light.axis_b), dot(light.axis_b, light.axis_c), dot(light.axis_c, light.axis_a));
+    return all(abs(lengths - lengths.x) <= vec3f(1e-5 * lengths.x)) && all(abs(products) <= vec3f(1e-5 * lengths.x));
+}
+#endif
 
 // No corners from behind a one-sided light, from its plane, or from inside a sphere. `sides` are those of the polygon that stands for a rim.
 fn area_light_outline(light: AreaLight, frame: SurfaceFrame, sides: u32) -> Outline {
@@ -73,6 +92,7 @@ fn area_light_outline(light: AreaLight, frame: SurfaceFrame, sides: u32) -> Outl
         let axes = mat3x3f(to_frame(frame, light.axis_a), to_frame(frame, light.axis_b), to_frame(frame, light.axis_c));
         outline.rim = rim_of_ellipsoid(to_frame(frame, offset), axes);
         outline.count = select(0u, sides, any(outline.rim.axis_a != vec3f(0.0)));
+        outline.circle = is_sphere(light);
     }
 #endif
     return outline;

@@ -3,7 +3,9 @@
 //
 // With z = n.h and D(z) the distribution:  H = integral of D,  Z = integral of D z,  S = integral of D sqrt(1 - z^2),  each over [z, 1] in z.
 //
-// Flags: NDF_BECKMANN, NDF_PHONG; GGX without.
+// GGX has a simpler way, `lobelia::ggx_half_vector`.
+//
+// Flags: NDF_BECKMANN; the distribution of Blinn and Phong without.
 #define_import_path lobelia::radial_primitive
 
 #import lobelia::brdf::phong_exponent
@@ -18,15 +20,6 @@ struct RadialPrimitive {
     across: f32,
 }
 
-// (atan t - t / (1 + t^2)) / t^3 for t >= 0; 2/3 at 0. Relative error 2e-6.
-fn arc_rest(t: f32) -> f32 {
-    let s = t * t;
-    if s < 0.25 {
-        return 0.666666667 + s * (-0.8 + s * (0.857142857 + s * (-0.888888889 + s * (0.909090909 + s * (-0.923076923 + s * (0.933333333 + s * (-0.941176471 + s * 0.947368421)))))));
-    }
-    return (atan(t) - t / (1.0 + s)) / (s * t);
-}
-
 // (sqrt(pi)/2 erf t - t e^(-t^2)) / t^3 for t >= 0; 2/3 at 0. Relative error 5e-6.
 fn gauss_rest(t: f32) -> f32 {
     let s = t * t;
@@ -34,27 +27,6 @@ fn gauss_rest(t: f32) -> f32 {
         return 0.666666667 + s * (-0.4 + s * (0.142857143 + s * (-0.037037037 + s * (0.00757575758 + s * (-0.00128205128 + s * (0.000185185185 + s * -2.3342670e-5))))));
     }
     return (erf_mean(t) - exp(-s)) / s;
-}
-
-// Walter et al. 2007, equation 33: D = alpha^2 / (pi (1 - k^2 z^2)^2), k^2 = 1 - alpha^2.
-// H = (om (1 + k^2 z) / (2 q) + alpha^2 artanh(k om / (1 - k^2 z)) / (2 k)) / pi, q = 1 - k^2 z^2.
-// Z = (1 - z^2) / (2 pi q).  S = alpha (atan t - t / (1 + t^2)) / (2 pi), t = tan / alpha.
-fn radial_primitive_ggx(alpha: f32, om: f32, z: f32) -> RadialPrimitive {
-    let alpha_squared = alpha * alpha;
-    let k_squared = max((1.0 - alpha) * (1.0 + alpha), 1e-6);
-    let k = sqrt(k_squared);
-    // With 1 - z as it is known, nothing of the lobe's width is lost.
-    let q = alpha_squared + k_squared * om * (1.0 + z);
-    // artanh x = log(1 + 2 x / (1 - x)) / 2, and 1 - k = alpha^2 / (1 + k).
-    let ratio = 2.0 * k / (alpha_squared * (1.0 - k * om / (1.0 + k)));
-    let artanh = 0.5 * log_one_plus(ratio * om) / om;
-    var primitive: RadialPrimitive;
-    primitive.whole = (0.5 * INV_PI) * ((1.0 + k_squared * z) / q + alpha_squared * artanh / k);
-    primitive.along = (0.5 * INV_PI) * (1.0 + z) / q;
-    let cosine = max(z, 1e-4);
-    let t = sqrt(om * (1.0 + z)) / (cosine * alpha);
-    primitive.across = (0.5 * INV_PI) * arc_rest(t) / (alpha_squared * cosine * cosine * cosine);
-    return primitive;
 }
 
 // D = (n+2) / (2 pi) z^n. H and Z are exact; S takes the power for e^(-(n-1)/2 s^2) with s = sqrt(1 - z^2): within 3 % of its largest value from n = 20
@@ -116,10 +88,6 @@ fn radial_primitive(alpha: f32, om: f32, z: f32) -> RadialPrimitive {
 #ifdef NDF_BECKMANN
     return radial_primitive_beckmann(alpha, om, z);
 #else
-#ifdef NDF_PHONG
     return radial_primitive_phong(alpha, om, z);
-#else
-    return radial_primitive_ggx(alpha, om, z);
-#endif
 #endif
 }

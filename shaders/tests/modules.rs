@@ -3,7 +3,8 @@
 
 use lobelia_shaders::{Composer, Flags, ShaderError, Source, modules};
 
-const FLAGS: [&str; 18] = [
+const FLAGS: [&str; 19] = [
+    "ANISOTROPIC",
     "SPECULAR",
     "NORMAL_MAP",
     "EMISSIVE",

@@ -65,7 +65,7 @@ fn techniques_agree() {
         let all = rough(&samples);
         let against = |image: &Image| compare(&samples, image, &all).unwrap();
         // A round light of 64 corners is round.
-        let ours = against(&of("exact-boundary", &["area.round_sides=64", "area.boundary_nodes=6"]));
+        let ours = against(&of("exact-boundary", &["area.round_arcs=32", "area.round_sides=64", "area.boundary_nodes=6"]));
         // Masking and Fresnel at the mean half vector: 1.1 % too much here for GGX, 1.6 % too little for Phong.
         let most = if ndf == Ndf::Ggx { 5e-4 } else { 4e-3 };
         assert!(ours.relative_mse < most && (ours.mean_ratio - 1.0).abs() < 0.02, "{ndf:?}: {ours:?}");
@@ -80,6 +80,48 @@ fn techniques_agree() {
         // What the comparison must reject: the cosine lobe is another lobe.
         let other = against(&of("phong", &[]));
         assert!(other.relative_mse > 4.0 * owen.relative_mse, "{ndf:?}, a cosine lobe: {other:?}");
+    }
+}
+
+/// Disks, spheres and their like as arcs, as polygons and as the quad that spins, for the specular lobe and for diffuse light.
+#[test]
+fn round_lights_as_arcs_polygons_and_quads() {
+    if !has_gpu() {
+        return;
+    }
+    let of = |variant: &str, set: &[&str]| render("builtin:area-lights", [160, 90], 1, Ndf::Ggx, &["no-visibility", variant], set);
+    let truth = of("exact-boundary", &["area.round_arcs=64"]);
+    let against = |image: &Image| compare(&truth, image, &Mask { counts: vec![true; truth.pixels.len()] }).unwrap();
+    let arcs = against(&of("exact-boundary", &[]));
+    let [few, many] =
+        ["area.round_sides=8", "area.round_sides=64"].map(|sides| against(&of("exact-boundary", &["area.round=polygon", sides])));
+    let quads = against(&of("exact-boundary", &["area.round=spinning_quad"]));
+    println!("arcs {arcs:?}\n8 sides {few:?}\n64 {many:?}\nquads {quads:?}");
+    assert!(arcs.relative_mse < 5e-5, "{arcs:?}");
+    assert!(many.relative_mse < 2e-5 && few.relative_mse > 10.0 * many.relative_mse, "{few:?}, {many:?}");
+    assert!(quads.relative_mse < 0.05 && quads.relative_mse > 100.0 * arcs.relative_mse, "{quads:?}");
+}
+
+/// Brushed surfaces: samples know nothing of half vectors.
+#[test]
+fn anisotropic_surfaces_agree_with_samples() {
+    if !has_gpu() {
+        return;
+    }
+    for set in
+        [["area.anisotropy=0.6", "area.tangent=x"], ["area.anisotropy=0.8", "area.tangent=z"], ["area.anisotropy=-0.5", "area.tangent=x"]]
+    {
+        let of = |variant: &str, more: &[&str]| {
+            render("builtin:area-lights", [160, 90], 1, Ndf::Ggx, &["no-visibility", variant], &[&set[..], more].concat())
+        };
+        let samples = of("monte-carlo", &["area.samples=256"]);
+        let all = rough(&samples);
+        let ours = compare(&samples, &of("exact-boundary", &[]), &all).unwrap();
+        let plain = render("builtin:area-lights", [160, 90], 1, Ndf::Ggx, &["no-visibility", "exact-boundary"], &[]);
+        let without = compare(&samples, &plain, &all).unwrap();
+        println!("{set:?}: {ours:?}, without anisotropy {without:?}");
+        assert!(ours.relative_mse < 5e-3 && (ours.mean_ratio - 1.0).abs() < 0.03, "{set:?}: {ours:?}");
+        assert!(without.relative_mse > 5.0 * ours.relative_mse, "{set:?}: {without:?} must be further off than {ours:?}");
     }
 }
 
@@ -110,5 +152,9 @@ fn what_cannot_be_asked_is_refused() {
     assert!(ask(Ndf::Phong, &["ltc"], &[]).contains("fitted to GGX only"));
     assert!(ask(Ndf::Ggx, &[], &["area.boundary_nodes=5"]).contains("must be 2, 3, 4 or 6"));
     assert!(ask(Ndf::Ggx, &[], &["area.edge_nodes=9"]).contains("edge_nodes"));
+    assert!(ask(Ndf::Phong, &[], &["area.anisotropy=0.5"]).contains("anisotropy is for GGX"));
+    assert!(ask(Ndf::Ggx, &["owen"], &["area.anisotropy=0.5"]).contains("anisotropy is for GGX"));
+    assert!(ask(Ndf::Phong, &["monte-carlo"], &["area.anisotropy=0.5"]).contains("anisotropy is for GGX"));
+    assert!(ask(Ndf::Ggx, &[], &["area.anisotropy=1"]).contains("anisotropy"));
     assert!(ask(Ndf::Ggx, &["monte-carlo"], &["area.samples=0"]).contains("samples"));
 }

@@ -1,10 +1,11 @@
 //! The `area-light` pass.
 
-use lobelia_frame::{AreaLightVisibility, GBuffer, ImageShape, Radiance, SceneWorld};
+use lobelia_frame::{AreaLightVisibility, Axis, GBuffer, ImageShape, Radiance, SceneWorld};
 use lobelia_graph::{
     BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, ParamValue, Pass, PlanContext, PortError,
     Ports, RunError, Specialisation, TraitsOf,
 };
+use lobelia_scene::Ndf;
 use lobelia_shaders::Source;
 use serde::{Deserialize, Serialize};
 
@@ -77,6 +78,25 @@ impl ParamValue for EdgeIntegral {
     }
 }
 
+/// What stands for the rim of a disk, a sphere or a map of one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Round {
+    /// Arcs of circles as the surface sees them.
+    #[default]
+    Arcs,
+    /// The regular polygon of equal area.
+    Polygon,
+    /// A quad that turns with the mirror direction.
+    SpinningQuad,
+}
+
+impl ParamValue for Round {
+    fn kind() -> String {
+        "arcs, polygon or spinning_quad".into()
+    }
+}
+
 /// Parameters of `area-light`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, lobelia_graph::Params)]
 #[serde(default, deny_unknown_fields)]
@@ -93,13 +113,24 @@ pub struct Params {
     /// Quadrature nodes of `owen`. Root mean square error: 9e-5, 7e-6 and 3e-7 of the lobe with 2, 3 and 4 at an exponent of 100.
     #[param(range = 2..=4)]
     pub edge_nodes: u32,
-    /// Quadrature nodes on either side of an edge's point nearest to the lobe. Relative error of the lobe up to 70 degrees from the normal: 2.5 %, 0.2 %, 0.05 %
-    /// and 1e-5 with 2, 3, 4 and 6; at 85 degrees 4 %, 2 %, 0.3 % and 1e-4.
+    /// Quadrature nodes on either side of an edge's point nearest to the lobe: 2, 3, 4 or 6. Relative error of a GGX lobe up to 70 degrees from the normal: 2 %, 0.3 %, 0.1 % and 1e-4; at 85 degrees
+    /// 8 %, 2 %, 0.3 % and 4e-4.
     #[param(range = 2..=6)]
     pub boundary_nodes: u32,
-    /// Corners of the polygon of equal area that stands for a disk, a sphere or a map of one.
+    /// What stands for the rim of a disk, a sphere or a map of one: arcs of circles as the surface sees them (`arcs`; for GGX by `exact_boundary`, other lobes take the polygon), the regular
+    /// polygon of equal area (`polygon`), or the quad of Lecocq et al. 2017 that turns with the mirror direction (`spinning_quad`; 10 to 20 % off).
+    pub round: Round,
+    /// Arcs of a whole rim; spheres are exact with their four. Relative error for ellipses: 0.2 % with 8, 0.02 % with 16.
+    #[param(range = 4..=64)]
+    pub round_arcs: u32,
+    /// Corners of the polygon.
     #[param(range = 8..=64)]
     pub round_sides: u32,
+    /// Brushed surfaces: alphas are alpha (1 + anisotropy) along the tangent and alpha (1 - anisotropy) across it, for all materials. GGX by `exact_boundary` only.
+    #[param(range = -0.95..=0.95)]
+    pub anisotropy: f32,
+    /// Scene axis whose part along a surface is its tangent.
+    pub tangent: Axis,
 }
 
 impl Default for Params {
@@ -109,9 +140,20 @@ impl Default for Params {
             method: Method::ExactBoundary,
             edge: EdgeIntegral::Owen,
             edge_nodes: 3,
-            boundary_nodes: 3,
+            boundary_nodes: 4,
+            round: Round::Arcs,
+            round_arcs: 8,
             round_sides: 16,
+            anisotropy: 0.0,
+            tangent: Axis::X,
         }
+    }
+}
+
+impl Params {
+    /// Whether the specular lobe is GGX, integrated as such.
+    fn integrates_ggx(&self, ndf: Ndf) -> bool {
+        self.lobe == Lobe::Scene && self.method == Method::ExactBoundary && ndf == Ndf::Ggx
     }
 }
 
@@ -170,18 +212,28 @@ impl Pass for AreaLightPass {
         let lobe_is = format!("lobe is {}", ["scene", "beckmann", "phong", "phong_two_axis"][lobe as usize]);
         found.push(Specialisation::new("LOBE_COSINE", matches!(lobe, Lobe::Phong | Lobe::PhongTwoAxis), lobe_is.clone()));
         found.push(Specialisation::new("NDF_BECKMANN", lobe == Lobe::Beckmann, lobe_is.clone()));
-        found.push(Specialisation::new("LOBE_TWO_AXIS", lobe == Lobe::PhongTwoAxis, lobe_is));
+        found.push(Specialisation::new("LOBE_TWO_AXIS", lobe == Lobe::PhongTwoAxis, lobe_is.clone()));
         let method_is = format!("method is {}", ["exact_boundary", "vertices", "split", "split_balanced"][method as usize]);
         let split = matches!(method, Method::Split | Method::SplitBalanced);
         found.push(Specialisation::new("METHOD_GREAT_ARCS", method != Method::ExactBoundary, method_is.clone()));
         found.push(Specialisation::new("METHOD_SPLIT", split, method_is.clone()));
-        found.push(Specialisation::new("METHOD_BALANCED", method == Method::SplitBalanced, method_is));
+        found.push(Specialisation::new("METHOD_BALANCED", method == Method::SplitBalanced, method_is.clone()));
         let edge_is = format!("edge is {}", ["lorentzian", "lorentzian_pearson", "ellipsoid", "owen"][edge as usize]);
         found.push(Specialisation::new("EDGE_PEAK", edge != EdgeIntegral::Owen, edge_is.clone()));
         found.push(Specialisation::new("EDGE_LORENTZIAN", edge == EdgeIntegral::Lorentzian, edge_is.clone()));
         found.push(Specialisation::new("EDGE_ELLIPSOID", edge == EdgeIntegral::Ellipsoid, edge_is));
         found.push(Specialisation::new("EDGE_NODES_TWO", edge_nodes == 2, format!("edge_nodes is {edge_nodes}")));
         found.push(Specialisation::new("EDGE_NODES_FOUR", edge_nodes == 4, format!("edge_nodes is {edge_nodes}")));
+        let ggx = context.params.integrates_ggx(traits.ndf);
+        found.push(Specialisation::new("LOBE_GGX", ggx, format!("{lobe_is}, {method_is}, distribution {:?}", traits.ndf)));
+        let round = context.params.round;
+        let round_is = format!("round is {}", ["arcs", "polygon", "spinning_quad"][round as usize]);
+        let lights = disks + spheres > 0;
+        let arcs = round == Round::Arcs && lights && (ggx || !inputs.gbuffer.flags.specular);
+        found.push(Specialisation::new("ROUND_ARCS", arcs, round_is.clone()));
+        found.push(Specialisation::new("ROUND_SPINNING_QUAD", round == Round::SpinningQuad && lights, round_is));
+        let anisotropy = context.params.anisotropy;
+        found.push(Specialisation::new("ANISOTROPIC", anisotropy != 0.0, format!("anisotropy is {anisotropy}")));
         let nodes = context.params.boundary_nodes;
         for (flag, count) in [("HALF_VECTOR_NODES_TWO", 2), ("HALF_VECTOR_NODES_FOUR", 4), ("HALF_VECTOR_NODES_SIX", 6)] {
             found.push(Specialisation::new(flag, nodes == count, format!("boundary_nodes is {nodes}")));
@@ -192,6 +244,12 @@ impl Pass for AreaLightPass {
     fn shape(context: &PlanContext<'_, Self>, inputs: &InputShapes<Self>) -> Result<OutputShapes<Self>, PortError> {
         if context.params.lobe == Lobe::Beckmann && context.params.method != Method::ExactBoundary {
             return Err(PortError::at("radiance", "lobe beckmann is integrated by method exact_boundary only"));
+        }
+        if context.params.anisotropy != 0.0 && !context.params.integrates_ggx(context.traits.ndf) {
+            return Err(PortError::at(
+                "radiance",
+                "anisotropy is for GGX lobes (`lobe: scene`, distribution ggx) and method exact_boundary only",
+            ));
         }
         if context.params.boundary_nodes == 5 {
             return Err(PortError::at("radiance", "boundary_nodes is 5, but must be 2, 3, 4 or 6"));
@@ -211,7 +269,12 @@ impl Pass for AreaLightPass {
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let words = [context.world.area_light_count, context.params.round_sides, 0, 0];
+        let words = [
+            context.world.area_light_count,
+            if context.flags.has("ROUND_ARCS") { context.params.round_arcs } else { context.params.round_sides },
+            context.params.tangent.index(),
+            context.params.anisotropy.to_bits(),
+        ];
         context.gpu.queue().write_buffer(&settings, 0, bytemuck::cast_slice(&words));
         Ok(Self { pipeline, settings })
     }

@@ -1,12 +1,15 @@
 // Lights every pixel by all area lights: integrals along the outline of each light.
 
+#import lobelia::anisotropic_ggx::{anisotropic_ggx_visibility, anisotropic_mean_alpha, anisotropic_stretch}
 #import lobelia::area_light::AreaLight
-#import lobelia::area_light_outline::{Outline, SurfaceFrame, area_light_outline, outline_place, outline_rim_corner, surface_frame, to_frame}
+#import lobelia::area_light_outline::{Outline, SurfaceFrame, area_light_outline, outline_place, outline_rim_corner, surface_frame, surface_frame_along, to_frame}
 #import lobelia::axial_moment::{AxialMoment, add_moment_edge, add_power_edge, lobe_fraction, two_axis_moment}
 #import lobelia::brdf::{Brdf, brdf_from_surface, fresnel, ggx_visibility, phong_exponent, phong_visibility, specular_albedo}
 #import lobelia::cosine_lobe::cosine_lobe_evaluate
+#import lobelia::circular_arc::{CircularArc, arc_of_great_circle, irradiance_along, rim_arc, rim_arc_count}
+#import lobelia::ggx_half_vector::{add_ggx_arc, ggx_mean}
 #import lobelia::half_vector_integral::{HalfVectorSum, add_half_vector_edge}
-#import lobelia::light_outline::{GreatArc, OutlineStep, OutlineWalk, close_outline, great_arc, lambert_edge, walk_outline}
+#import lobelia::light_outline::{GreatArc, OutlineLine, OutlineWalk, great_arc, lambert_edge, rim_point, spinning_quad, take_horizon, visible_rim, walk_outline}
 #import lobelia::math::{safe_normalize, storable}
 #import lobelia::microfacet_lobe::beckmann_visibility
 #import lobelia::scene::{View, scene_position}
@@ -16,8 +19,9 @@ struct Settings {
     light_count: u32,
     // Of the polygon that stands for a round light.
     sides: u32,
-    padding_a: u32,
-    padding_b: u32,
+    // Scene axis whose part along a surface is its tangent.
+    tangent: u32,
+    anisotropy: f32,
 }
 
 @group(0) @binding(0) var<uniform> view: View;
@@ -49,11 +53,28 @@ fn corner(outline: Outline, frame: SurfaceFrame, index: u32) -> vec3f {
         return to_frame(frame, corners[outline_place(outline, index)].xyz - frame.position);
     }
 #endif
+#ifdef ROUND_SPINNING_QUAD
+    return rim_point(outline.rim, 1.57079633 * f32(index));
+#else
     return outline_rim_corner(outline, index);
+#endif
 }
+
+#ifdef ROUND_SPINNING_QUAD
+// The outline with the quad that stands for a round light, for a lobe that is as wide as `spread`.
+fn spun(outline: Outline, frame: SurfaceFrame, spread: f32) -> Outline {
+    var quad = outline;
+    if outline.round {
+        quad.rim = spinning_quad(outline.rim, mirror(frame.viewer), spread);
+        quad.count = 4u;
+    }
+    return quad;
+}
+#endif
 
 // The specular lobe of a surface, and what of it the light fills; which fields are used depends on the lobe and the method.
 struct SpecularSum {
+    ggx: vec3f,
     half_vectors: HalfVectorSum,
     // Of a cosine lobe about the mirror direction; or of the lobes that stand for a microfacet distribution, about the normal in half vectors.
     first: AxialMoment,
@@ -65,16 +86,26 @@ struct SpecularSum {
     around: AxialMoment,
 }
 
+#ifdef ANISOTROPIC
+fn stretch() -> vec2f {
+    return anisotropic_stretch(settings.anisotropy);
+}
+#else
+fn stretch() -> vec2f {
+    return vec2f(1.0);
+}
+#endif
+
 fn mirror(viewer: vec3f) -> vec3f {
-    return vec3f(-viewer.x, 0.0, viewer.z);
+    return vec3f(-viewer.xy, viewer.z);
 }
 
-#ifdef LOBE_COSINE
 // Phong's exponent falls off in angles of reflected rays as the distribution of the same alpha does in those of half vectors, which are half as large.
 fn exponent_of(alpha: f32) -> f32 {
     return 0.25 * phong_exponent(alpha);
 }
 
+#ifdef LOBE_COSINE
 fn add_specular(sum: ptr<function, SpecularSum>, arc: GreatArc, viewer: vec3f, alpha: f32) {
     let n = exponent_of(alpha);
     var first = (*sum).first;
@@ -191,16 +222,36 @@ fn reflected(brdf: Brdf, sum: SpecularSum, viewer: vec3f) -> vec3f {
     return energy * reflected_at(brdf, h, viewer) * dot(h, viewer);
 }
 #else
+#ifdef LOBE_GGX
+fn add_specular_arc(sum: ptr<function, SpecularSum>, arc: CircularArc, viewer: vec3f, alpha: f32) {
+    var ggx = (*sum).ggx;
+    add_ggx_arc(&ggx, arc, viewer, vec3f(stretch(), alpha));
+    (*sum).ggx = ggx;
+}
+
+fn add_specular(sum: ptr<function, SpecularSum>, arc: GreatArc, viewer: vec3f, alpha: f32) {
+    add_specular_arc(sum, arc_of_great_circle(arc), viewer, alpha);
+}
+
+fn mean_half_vector(sum: SpecularSum, alpha: f32) -> vec3f {
+    return ggx_mean(sum.ggx, vec3f(stretch(), alpha));
+}
+#else
 fn add_specular(sum: ptr<function, SpecularSum>, arc: GreatArc, viewer: vec3f, alpha: f32) {
     var half_vectors = (*sum).half_vectors;
     add_half_vector_edge(&half_vectors, arc, viewer, alpha);
     (*sum).half_vectors = half_vectors;
 }
 
+fn mean_half_vector(sum: SpecularSum, alpha: f32) -> vec3f {
+    return sum.half_vectors.mean;
+}
+#endif
+
 // At the mean half vector that the lobe and the light have together; the factor h.v is exact.
 fn reflected(brdf: Brdf, sum: SpecularSum, viewer: vec3f) -> vec3f {
-    let energy = max(dot(sum.half_vectors.mean, viewer), 0.0);
-    return energy * reflected_at(brdf, safe_normalize(sum.half_vectors.mean, NORMAL), viewer);
+    let mean = mean_half_vector(sum, brdf.alpha);
+    return max(dot(mean, viewer), 0.0) * reflected_at(brdf, safe_normalize(mean, NORMAL), viewer);
 }
 #endif
 
@@ -216,7 +267,12 @@ fn reflected_at(brdf: Brdf, h: vec3f, viewer: vec3f) -> vec3f {
 #ifdef NDF_PHONG
     let masking = phong_visibility(brdf.alpha, n_dot_l, n_dot_v);
 #else
+#ifdef ANISOTROPIC
+    let light = vec3f(2.0 * cosine * h.xy - viewer.xy, n_dot_l);
+    let masking = anisotropic_ggx_visibility(brdf.alpha / stretch(), light, vec3f(viewer.xy, n_dot_v));
+#else
     let masking = ggx_visibility(brdf.alpha, n_dot_l, n_dot_v);
+#endif
 #endif
 #endif
     return fresnel(brdf, cosine) * min(4.0 * masking * n_dot_l, MAX_FACTOR);
@@ -248,47 +304,107 @@ fn reflected_from_small(brdf: Brdf, outline: Outline, frame: SurfaceFrame) -> ve
 }
 #endif
 
-// Radiance that leaves towards the viewer for a light of radiance 1 within an outline.
-fn light_from(brdf: Brdf, outline: Outline, frame: SurfaceFrame) -> vec3f {
-    if outline.count < 3u {
-        return vec3f(0.0);
+// A surface's integrals over a light.
+struct LightSum {
+    cosine: f32,
+    specular: SpecularSum,
+}
+
+fn add_line(sum: ptr<function, LightSum>, line: OutlineLine, viewer: vec3f, alpha: f32) {
+    let arc = great_arc(line.start, line.to);
+    if arc.length > 0.0 {
+        (*sum).cosine += lambert_edge(arc);
+#ifdef SPECULAR
+        var specular = (*sum).specular;
+        add_specular(&specular, arc, viewer, alpha);
+        (*sum).specular = specular;
+#endif
     }
-    var cosine = 0.0;
-    var specular: SpecularSum;
+}
+
+fn over_polygon(outline: Outline, frame: SurfaceFrame, alpha: f32) -> LightSum {
+    var sum: LightSum;
     var walk: OutlineWalk;
     var previous = corner(outline, frame, outline.count - 1u);
-    for (var index = 0u; index <= outline.count; index++) {
-        var step: OutlineStep;
-        if index < outline.count {
-            let next = corner(outline, frame, index);
-            step = walk_outline(&walk, previous, next);
-            previous = next;
+    var index = 0u;
+    while index < outline.count || walk.waits {
+        var line: OutlineLine;
+        if walk.waits {
+            line = take_horizon(&walk);
         } else {
-            step = close_outline(walk);
+            let next = corner(outline, frame, index);
+            index += 1u;
+            line = walk_outline(&walk, previous, next, index == outline.count);
+            previous = next;
         }
-        for (var part = 0u; part < 2u; part++) {
-            let start = select(step.horizon_from, step.start, part == 1u);
-            let to = select(step.horizon_to, step.to, part == 1u);
-            if all(start == to) {
-                continue;
-            }
-            let arc = great_arc(start, to);
-            if arc.length > 0.0 {
-                cosine += lambert_edge(arc);
-#ifdef SPECULAR
-                add_specular(&specular, arc, frame.viewer, brdf.alpha);
-#endif
-            }
-        }
+        add_line(&sum, line, frame.viewer, alpha);
     }
-    var sent = brdf.diffuse * max(cosine, 0.0);
+    return sum;
+}
+
+#ifdef ROUND_ARCS
+// Arcs of a circle that is seen as one; more would be no better.
+const CIRCLE_ARCS: u32 = 4u;
+
+// Circular arcs along the rim above the horizon, and the horizon between its ends.
+fn over_rim(outline: Outline, frame: SurfaceFrame, alpha: f32) -> LightSum {
+    var sum: LightSum;
+    let visible = visible_rim(outline.rim);
+    let count = rim_arc_count(visible, select(outline.count, CIRCLE_ARCS, outline.circle));
+    for (var place = 0u; place < count; place++) {
+        let arc = rim_arc(outline.rim, visible, place, count);
+        sum.cosine += irradiance_along(arc);
+#ifdef SPECULAR
+        var specular = sum.specular;
+        add_specular_arc(&specular, arc, frame.viewer, alpha);
+        sum.specular = specular;
+#endif
+    }
+    if !visible.whole {
+        let ends = OutlineLine(rim_point(outline.rim, visible.end), rim_point(outline.rim, visible.start));
+        add_line(&sum, ends, frame.viewer, alpha);
+    }
+    return sum;
+}
+#endif
+
+fn over_light(outline: Outline, frame: SurfaceFrame, alpha: f32) -> LightSum {
+#ifdef ROUND_ARCS
+    if outline.round {
+        return over_rim(outline, frame, alpha);
+    }
+#endif
+    return over_polygon(outline, frame, alpha);
+}
+
+// Radiance that leaves towards the viewer for a light of radiance 1 within an outline.
+fn light_from(brdf: Brdf, seen: Outline, frame: SurfaceFrame) -> vec3f {
+    if seen.count < 3u {
+        return vec3f(0.0);
+    }
+    var outline = seen;
+#ifdef ROUND_SPINNING_QUAD
+#ifdef SPECULAR
+    outline = spun(seen, frame, sqrt(2.0 / (exponent_of(brdf.alpha) + 2.0)));
+#else
+    outline = spun(seen, frame, 1.0);
+#endif
+#endif
+    var sum = over_light(outline, frame, brdf.alpha);
+#ifdef ROUND_SPINNING_QUAD
+#ifdef SPECULAR
+    // A quad as wide as the specular lobe wants it has not the area of the light.
+    sum.cosine = over_light(spun(seen, frame, 1.0), frame, brdf.alpha).cosine;
+#endif
+#endif
+    var sent = brdf.diffuse * max(sum.cosine, 0.0);
 #ifdef SPECULAR
 #ifdef LOBE_COSINE
     if is_small(outline, frame, brdf.alpha) {
         return sent + reflected_from_small(brdf, outline, frame);
     }
 #endif
-    sent += reflected(brdf, specular, frame.viewer);
+    sent += reflected(brdf, sum.specular, frame.viewer);
 #endif
     return sent;
 }
@@ -312,13 +428,18 @@ fn area_light(@builtin(global_invocation_id) id: vec3u) {
     packed.geometric_normal = textureLoad(gbuffer_geometric_normal, id.xy, 0).x;
 #endif
     let surface = unpack_surface(packed);
-    let brdf = brdf_from_surface(surface);
+    var brdf = brdf_from_surface(surface);
     let position = scene_position(view, vec2f(id.xy), depth);
     let to_viewer = safe_normalize(view.position - position, surface.normal);
     var total = vec3f(0.0);
     // A shading normal that is turned away reflects nothing to the viewer.
     if dot(surface.normal, to_viewer) > 0.0 {
+#ifdef ANISOTROPIC
+        let frame = surface_frame_along(position, surface.normal, to_viewer, settings.tangent);
+        brdf.alpha = anisotropic_mean_alpha(brdf.alpha, settings.anisotropy);
+#else
         let frame = surface_frame(position, surface.normal, to_viewer);
+#endif
         for (var index = 0u; index < settings.light_count; index++) {
             let light = lights[index];
             let factor = light_from(brdf, area_light_outline(light, frame, settings.sides), frame);

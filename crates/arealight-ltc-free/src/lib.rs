@@ -21,7 +21,8 @@
 //! # What remains
 //!
 //! Masking and Fresnel's term at one half vector: 1 % too much in the mean of `builtin:area-lights`, up to 10 % of the specular light for large lights on rough or grazed
-//! surfaces. Shadows come as one factor for each light. Anisotropic surfaces are not in the G-buffer, and so not here.
+//! surfaces. Shadows come as one factor for each light. G-buffers hold no tangents: `anisotropy` is one for all
+//! surfaces, about an axis of the scene.
 
 mod area_light;
 

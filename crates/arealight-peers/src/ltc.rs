@@ -34,7 +34,7 @@ impl Technique for Ltc {
         [0, 0]
     }
 
-    fn refuses(ndf: Ndf) -> Option<&'static str> {
+    fn refuses(_: &Self::Params, ndf: Ndf) -> Option<&'static str> {
         (ndf == Ndf::Phong).then_some("linearly transformed cosines are fitted to GGX only, but the scene's distribution is phong")
     }
 

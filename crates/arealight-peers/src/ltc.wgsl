@@ -26,25 +26,10 @@ fn light_from(index: u32, brdf: Brdf, frame: SurfaceFrame, pixel: vec2u) -> vec3
     if outline.count < 3u {
         return vec3f(0.0);
     }
+    var sent = brdf.diffuse * mapped_irradiance(outline, frame, NO_MAP);
 #ifdef SPECULAR
     let fit = fit_at(brdf.alpha, frame.viewer.z);
-    var lobe = 0.0;
-    var lobe_walk: OutlineWalk;
-#endif
-    var cosine = 0.0;
-    var walk: OutlineWalk;
-    var previous = corner(outline, frame, outline.count - 1u);
-    for (var place = 0u; place < outline.count; place++) {
-        let next = corner(outline, frame, place);
-        cosine += lambert_step(walk_outline(&walk, previous, next));
-#ifdef SPECULAR
-        lobe += lambert_step(walk_outline(&lobe_walk, fit.inverse * previous, fit.inverse * next));
-#endif
-        previous = next;
-    }
-    var sent = brdf.diffuse * max(cosine + lambert_step(close_outline(walk)), 0.0);
-#ifdef SPECULAR
-    let share = max(lobe + lambert_step(close_outline(lobe_walk)), 0.0) * 0.318309886;
+    let share = mapped_irradiance(outline, frame, fit.inverse) * 0.318309886;
     sent += share * (brdf.reflectance_normal * (fit.reflected.x - fit.reflected.y) + vec3f(brdf.reflectance_grazing * fit.reflected.y));
 #endif
     return sent;

@@ -1,6 +1,8 @@
 //! The `area-monte-carlo` pass.
 
 use crate::shared::{PeerPass, Technique};
+use lobelia_frame::Axis;
+use lobelia_scene::Ndf;
 use lobelia_shaders::Source;
 use serde::{Deserialize, Serialize};
 
@@ -20,11 +22,16 @@ pub struct MonteCarloParams {
     pub samples: u32,
     /// Added to the run's seed, to try other samples with everything else equal.
     pub seed: u32,
+    /// Brushed surfaces: alphas are alpha (1 + anisotropy) along the tangent and alpha (1 - anisotropy) across it, for all materials. GGX only.
+    #[param(range = -0.95..=0.95)]
+    pub anisotropy: f32,
+    /// Scene axis whose part along a surface is its tangent.
+    pub tangent: Axis,
 }
 
 impl Default for MonteCarloParams {
     fn default() -> Self {
-        Self { samples: 16, seed: 0 }
+        Self { samples: 16, seed: 0, anisotropy: 0.0, tangent: Axis::X }
     }
 }
 
@@ -42,5 +49,13 @@ impl Technique for MonteCarlo {
 
     fn settings(params: &MonteCarloParams) -> [u32; 2] {
         [params.samples, params.seed]
+    }
+
+    fn anisotropy(params: &MonteCarloParams) -> (f32, Axis) {
+        (params.anisotropy, params.tangent)
+    }
+
+    fn refuses(params: &MonteCarloParams, ndf: Ndf) -> Option<&'static str> {
+        (params.anisotropy != 0.0 && ndf != Ndf::Ggx).then_some("anisotropy is for GGX lobes only")
     }
 }

@@ -1,6 +1,7 @@
 
+#import lobelia::anisotropic_ggx::{anisotropic_alphas, anisotropic_ggx_distribution, anisotropic_ggx_visibility}
 #import lobelia::area_light::{AREA_LIGHT_DISK, AREA_LIGHT_POLYGON}
-#import lobelia::brdf::evaluate_brdf
+#import lobelia::brdf::{evaluate_brdf, fresnel}
 #import lobelia::direction_sampling::sample_cone
 #import lobelia::sampling::{hash, r2_point, unit_float}
 
@@ -116,6 +117,18 @@ fn sample_round(light: AreaLight, frame: SurfaceFrame, u: vec2f) -> LightSample 
     return LightSample(mapped / size, 6.28318531 * versine * abs(determinant) / (size * size * size));
 }
 
+// Towards a light and a viewer above the horizon.
+fn reflectance(brdf: Brdf, l: vec3f, v: vec3f) -> vec3f {
+#ifdef ANISOTROPIC
+    let h = safe_normalize(l + v, NORMAL);
+    let alphas = anisotropic_alphas(brdf.alpha, settings.anisotropy);
+    let lobe = anisotropic_ggx_distribution(alphas, h) * anisotropic_ggx_visibility(alphas, l, v);
+    return brdf.diffuse + lobe * fresnel(brdf, clamp(dot(h, v), 0.0, 1.0));
+#else
+    return evaluate_brdf(brdf, NORMAL, NORMAL, l, v);
+#endif
+}
+
 fn light_from(index: u32, brdf: Brdf, frame: SurfaceFrame, pixel: vec2u) -> vec3f {
     let light = lights[index];
     let outline = area_light_outline(light, frame, SIDES);
@@ -148,7 +161,7 @@ fn light_from(index: u32, brdf: Brdf, frame: SurfaceFrame, pixel: vec2u) -> vec3
 #endif
         let cosine = sample.direction.z;
         if cosine > 0.0 && sample.weight > 0.0 {
-            sum += min(evaluate_brdf(brdf, NORMAL, NORMAL, sample.direction, frame.viewer) * (cosine * sample.weight), vec3f(MAX_FACTOR));
+            sum += min(reflectance(brdf, sample.direction, frame.viewer) * (cosine * sample.weight), vec3f(MAX_FACTOR));
         }
     }
     return sum / f32(count);

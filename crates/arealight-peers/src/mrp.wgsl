@@ -27,8 +27,6 @@ fn light_from(index: u32, brdf: Brdf, frame: SurfaceFrame, pixel: vec2u) -> vec3
     if outline.count < 3u {
         return vec3f(0.0);
     }
-    var cosine = 0.0;
-    var walk: OutlineWalk;
     let last = corner(outline, frame, outline.count - 1u);
     var previous = last;
     let first = corner(outline, frame, 0u);
@@ -36,11 +34,10 @@ fn light_from(index: u32, brdf: Brdf, frame: SurfaceFrame, pixel: vec2u) -> vec3
     var area = vec3f(0.0);
     for (var place = 0u; place < outline.count; place++) {
         let next = corner(outline, frame, place);
-        cosine += lambert_step(walk_outline(&walk, previous, next));
         area -= cross(previous - first, next - first);
         previous = next;
     }
-    var sent = brdf.diffuse * max(cosine + lambert_step(close_outline(walk)), 0.0);
+    var sent = brdf.diffuse * mapped_irradiance(outline, frame, NO_MAP);
 #ifdef SPECULAR
     let size = 0.5 * length(area);
     let facing = area / max(2.0 * size, 1e-30);

@@ -2,7 +2,7 @@
 //! sends, and its settings.
 
 use crate::table::LtcTable;
-use lobelia_frame::{AreaLightVisibility, GBuffer, ImageShape, Radiance, SceneWorld};
+use lobelia_frame::{AreaLightVisibility, Axis, GBuffer, ImageShape, Radiance, SceneWorld};
 use lobelia_graph::{
     BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, Params, Pass, PlanContext, PortError,
     Ports, RunError, Specialisation, TraitsOf,
@@ -20,8 +20,12 @@ pub trait Technique: 'static {
     type Params: Params;
     /// Two numbers for the shader.
     fn settings(params: &Self::Params) -> [u32; 2];
+    /// How alphas of surfaces differ along a tangent and across it (see `lobelia_lobes::anisotropic_ggx`), and the axis that the tangent is from.
+    fn anisotropy(_: &Self::Params) -> (f32, Axis) {
+        (0.0, Axis::X)
+    }
     /// Whether it works with a distribution of normals, and why not.
-    fn refuses(_: Ndf) -> Option<&'static str> {
+    fn refuses(_: &Self::Params, _: Ndf) -> Option<&'static str> {
         None
     }
     /// The table that its shader reads.
@@ -112,6 +116,8 @@ impl<T: Technique> Pass for PeerPass<T> {
         let visibility = inputs.visibility.is_some();
         let reason = if visibility { "visibility is connected" } else { "no visibility is connected" };
         found.push(Specialisation::new("VISIBILITY", visibility, reason));
+        let (anisotropy, _) = T::anisotropy(context.params);
+        found.push(Specialisation::new("ANISOTROPIC", anisotropy != 0.0, format!("anisotropy is {anisotropy}")));
         let shapes = [
             ("POLYGON_LIGHTS", traits.flat_lights(), "quad or polygon"),
             ("DISK_LIGHTS", traits.disk_lights, "disk"),
@@ -129,7 +135,7 @@ impl<T: Technique> Pass for PeerPass<T> {
 
     fn shape(context: &PlanContext<'_, Self>, inputs: &InputShapes<Self>) -> Result<OutputShapes<Self>, PortError> {
         if inputs.gbuffer.flags.specular
-            && let Some(reason) = T::refuses(context.traits.ndf)
+            && let Some(reason) = T::refuses(context.params, context.traits.ndf)
         {
             return Err(PortError::at("radiance", reason));
         }
@@ -145,7 +151,9 @@ impl<T: Technique> Pass for PeerPass<T> {
         let storage = |label: &str, bytes: &[u8]| buffer(gpu, label, bytes, wgpu::BufferUsages::STORAGE);
         let table = T::table();
         let [a, b] = T::settings(context.params);
-        let words = [context.world.area_light_count, table.as_ref().map_or(0, |table| table.size), a, b];
+        let (anisotropy, tangent) = T::anisotropy(context.params);
+        let table_size = table.as_ref().map_or(0, |table| table.size);
+        let words = [context.world.area_light_count, table_size, a, b, tangent.index(), anisotropy.to_bits(), 0, 0];
         // Six numbers in eight, so that they are read as two vectors.
         let padded = table.map(|table| {
             table.fits.iter().flat_map(|fit| [fit[0], fit[1], fit[2], fit[3], fit[4], fit[5], 0.0, 0.0]).collect::<Vec<f32>>()

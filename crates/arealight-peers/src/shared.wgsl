@@ -1,9 +1,9 @@
 // Lights every pixel by all area lights; what one light sends is the business of `light_from`.
 
 #import lobelia::area_light::AreaLight
-#import lobelia::area_light_outline::{Outline, SurfaceFrame, area_light_outline, outline_place, outline_rim_corner, surface_frame, to_frame}
+#import lobelia::area_light_outline::{Outline, SurfaceFrame, area_light_outline, outline_place, outline_rim_corner, surface_frame, surface_frame_along, to_frame}
 #import lobelia::brdf::{Brdf, brdf_from_surface}
-#import lobelia::light_outline::{GreatArc, OutlineStep, OutlineWalk, close_outline, great_arc, lambert_edge, walk_outline}
+#import lobelia::light_outline::{OutlineLine, OutlineWalk, great_arc, lambert_edge, take_horizon, walk_outline}
 #import lobelia::math::{safe_normalize, storable}
 #import lobelia::scene::{View, scene_position}
 #import lobelia::surface::{PackedSurface, Surface, unpack_surface}
@@ -14,6 +14,11 @@ struct Settings {
     table_size: u32,
     first: u32,
     second: u32,
+    // Scene axis whose part along a surface is its tangent.
+    tangent: u32,
+    anisotropy: f32,
+    padding_a: u32,
+    padding_b: u32,
 }
 
 @group(0) @binding(0) var<uniform> view: View;
@@ -49,17 +54,28 @@ fn corner(outline: Outline, frame: SurfaceFrame, index: u32) -> vec3f {
     return outline_rim_corner(outline, index);
 }
 
-// What a step of a walk adds to Lambert's integral.
-fn lambert_step(step: OutlineStep) -> f32 {
+// Lambert's formula over an outline under a linear map.
+fn mapped_irradiance(outline: Outline, frame: SurfaceFrame, map: mat3x3f) -> f32 {
     var sum = 0.0;
-    if any(step.horizon_from != step.horizon_to) {
-        sum += lambert_edge(great_arc(step.horizon_from, step.horizon_to));
+    var walk: OutlineWalk;
+    var previous = map * corner(outline, frame, outline.count - 1u);
+    var index = 0u;
+    while index < outline.count || walk.waits {
+        var line: OutlineLine;
+        if walk.waits {
+            line = take_horizon(&walk);
+        } else {
+            let next = map * corner(outline, frame, index);
+            index += 1u;
+            line = walk_outline(&walk, previous, next, index == outline.count);
+            previous = next;
+        }
+        sum += lambert_edge(great_arc(line.start, line.to));
     }
-    if any(step.start != step.to) {
-        sum += lambert_edge(great_arc(step.start, step.to));
-    }
-    return sum;
+    return max(sum, 0.0);
 }
+
+const NO_MAP: mat3x3f = mat3x3f(vec3f(1.0, 0.0, 0.0), vec3f(0.0, 1.0, 0.0), vec3f(0.0, 0.0, 1.0));
 
 @compute @workgroup_size(8, 8)
 fn light_pixels(@builtin(global_invocation_id) id: vec3u) {
@@ -86,7 +102,11 @@ fn light_pixels(@builtin(global_invocation_id) id: vec3u) {
     var total = vec3f(0.0);
     // A shading normal that is turned away reflects nothing to the viewer.
     if dot(surface.normal, to_viewer) > 0.0 {
+#ifdef ANISOTROPIC
+        let frame = surface_frame_along(position, surface.normal, to_viewer, settings.tangent);
+#else
         let frame = surface_frame(position, surface.normal, to_viewer);
+#endif
         for (var index = 0u; index < settings.light_count; index++) {
             let factor = light_from(index, brdf, frame, id.xy);
             var sent = min(factor, vec3f(MAX_FACTOR)) * min(lights[index].radiance, vec3f(MAX_FACTOR));

@@ -15,6 +15,7 @@
 //! *Scene space* is world space minus the scene's whole-metre origin, in metres, so that 32-bit floats keep their precision far from the world's origin.
 
 mod area_light_visibility;
+mod axis;
 mod gbuffer;
 mod light;
 mod patch_moments;
@@ -24,6 +25,7 @@ mod sampling_density;
 mod world;
 
 pub use area_light_visibility::{AreaLightVisibility, AreaLightVisibilityShape};
+pub use axis::Axis;
 pub use gbuffer::{GBuffer, GBufferShape, SurfaceFlags, SurfaceFormats};
 pub use light::{LightVisibility, LightVisibilityShape, VirtualLight, VirtualLightLobes, VirtualLights, VirtualLightsShape};
 pub use patch_moments::{LobeLength, PatchMoments, PatchMomentsShape};

@@ -14,7 +14,7 @@ use lobelia::{
 use std::f64::consts::TAU;
 
 const WGSL: &str = "#import lobelia::axial_moment::{AxialMoment, add_moment_edge, add_power_edge, lobe_fraction, two_axis_moment}
-#import lobelia::light_outline::{GreatArc, OutlineStep, OutlineWalk, close_outline, great_arc, walk_outline}
+#import lobelia::light_outline::{GreatArc, OutlineLine, OutlineWalk, great_arc, take_horizon, walk_outline}
 var<private> axis: vec3f;
 var<private> n: f32;
 var<private> one: AxialMoment;

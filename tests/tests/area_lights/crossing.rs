@@ -1,6 +1,6 @@
 //! Lights that move through the horizon, through the lobe and onto the surface: nothing pops.
 
-use super::half_vectors::{Track, light_of};
+use super::ggx::{Track, light_of};
 use glam::DVec3;
 
 const STEPS: usize = 200;

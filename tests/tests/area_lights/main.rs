@@ -3,6 +3,7 @@
 
 mod cosine_lobes;
 mod crossing;
+mod ggx;
 mod half_vectors;
 mod outlines;
 mod round;

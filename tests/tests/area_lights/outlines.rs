@@ -16,17 +16,18 @@ fn walk_row(row: Row) {
     var walk: OutlineWalk;
     let count = u32(row.corners[0].w);
     var previous = row.corners[count - 1u].xyz;
-    for (var index = 0u; index <= count; index++) {
-        var step: OutlineStep;
-        if index < count {
-            let next = row.corners[index].xyz;
-            step = walk_outline(&walk, previous, next);
-            previous = next;
+    var index = 0u;
+    while index < count || walk.waits {
+        var line: OutlineLine;
+        if walk.waits {
+            line = take_horizon(&walk);
         } else {
-            step = close_outline(walk);
+            let next = row.corners[index].xyz;
+            index += 1u;
+            line = walk_outline(&walk, previous, next, index == count);
+            previous = next;
         }
-        if any(step.horizon_from != step.horizon_to) { piece(great_arc(step.horizon_from, step.horizon_to)); }
-        if any(step.start != step.to) { piece(great_arc(step.start, step.to)); }
+        if any(line.start != line.to) { piece(great_arc(line.start, line.to)); }
     }
 }
 ";

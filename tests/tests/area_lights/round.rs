@@ -7,28 +7,33 @@ use lobelia::{
     lobes::area_light::{
         boundary::{Boundary, Ellipse},
         lambert::{irradiance, irradiance_of_sphere},
-        round::{Silhouette, ellipsoid},
+        round::{Silhouette, ellipsoid, spinning_quad},
     },
     shaders::Flags,
 };
 
-const WGSL: &str = "#import lobelia::light_outline::{OutlineStep, OutlineWalk, Rim, close_outline, great_arc, lambert_edge, rim_corner, rim_of_disk, rim_of_ellipsoid, walk_outline}
+const WGSL: &str = "#import lobelia::light_outline::{OutlineLine, OutlineWalk, Rim, great_arc, lambert_edge, rim_corner, rim_of_disk, rim_of_ellipsoid, take_horizon, walk_outline}
 struct Input { center: vec4f, a: vec4f, b: vec4f, c: vec4f }
 struct Output { values: vec4f }
-fn added(step: OutlineStep) -> f32 {
-    return lambert_edge(great_arc(step.horizon_from, step.horizon_to)) + lambert_edge(great_arc(step.start, step.to));
-}
 fn irradiance_of(rim: Rim, sides: u32) -> f32 {
     if all(rim.axis_a == vec3f(0.0)) { return -1.0; }
     var walk: OutlineWalk;
     var sum = 0.0;
     var previous = rim_corner(rim, sides - 1u, sides);
-    for (var corner = 0u; corner < sides; corner++) {
-        let next = rim_corner(rim, corner, sides);
-        sum += added(walk_outline(&walk, previous, next));
-        previous = next;
+    var corner = 0u;
+    while corner < sides || walk.waits {
+        var line: OutlineLine;
+        if walk.waits {
+            line = take_horizon(&walk);
+        } else {
+            let next = rim_corner(rim, corner, sides);
+            corner += 1u;
+            line = walk_outline(&walk, previous, next, corner == sides);
+            previous = next;
+        }
+        sum += lambert_edge(great_arc(line.start, line.to));
     }
-    return sum + added(close_outline(walk));
+    return sum;
 }
 fn evaluate(input: Input) -> Output {
     var rim = rim_of_disk(input.center.xyz, input.a.xyz, input.b.xyz);
@@ -109,4 +114,53 @@ fn spheres_have_the_irradiance_of_their_closed_form() {
             "{elevation}, {sine}: {found:?} for {expected}"
         );
     }
+}
+
+/// Corners of the quad that spins, for disks that are turned, far and near, with mirror directions that meet their plane and miss it.
+#[test]
+fn spinning_quads_hold_in_32_bits() {
+    const QUADS: &str = "#import lobelia::light_outline::{rim_of_disk, rim_point, spinning_quad}
+    struct Input { center: vec4f, a: vec4f, b: vec4f, mirror: vec4f }
+    struct Output { corners: array<vec4f, 4> }
+    fn evaluate(input: Input) -> Output {
+        let rim = spinning_quad(rim_of_disk(input.center.xyz, input.a.xyz, input.b.xyz), input.mirror.xyz, input.mirror.w);
+        var output: Output;
+        for (var index = 0u; index < 4u; index++) { output.corners[index] = vec4f(rim_point(rim, 1.57079633 * f32(index)), 0.0); }
+        return output;
+    }";
+    let Some(gpu) = gpu() else { return };
+    let cases: Vec<(Ellipse, DVec3, f64)> = (0..20_000)
+        .map(|index| {
+            let mut numbers = Numbers::new(index);
+            let (a, b) = numbers.direction().any_orthonormal_pair();
+            let radius = numbers.between(0.2, 3.0);
+            let rim = Ellipse { center: numbers.direction() * numbers.between(0.5, 10.0), axis_a: a * radius, axis_b: b * radius }.facing();
+            (rim, numbers.direction(), numbers.between(0.01, 1.0))
+        })
+        .collect();
+    let row = |(rim, mirror, spread): &(Ellipse, DVec3, f64)| {
+        [(rim.center, 0.0), (rim.axis_a, 0.0), (rim.axis_b, 0.0), (*mirror, *spread)].map(|(v, w)| v.as_vec3().extend(w as f32).to_array())
+    };
+    let rows: Vec<[[f32; 4]; 4]> = cases.iter().map(row).collect();
+    let found: Vec<[[f32; 4]; 4]> = evaluate(gpu, QUADS, &Flags::new(), &rows).unwrap();
+    let corners = |(rim, mirror, spread): &(Ellipse, DVec3, f64)| {
+        let radius = rim.axis_a.length();
+        let axes = [rim.axis_a, rim.axis_b, rim.axis_a.cross(rim.axis_b) / radius].map(|axis| axis / radius);
+        let local = |v: DVec3| DVec3::new(v.dot(axes[0]), v.dot(axes[1]), v.dot(axes[2]));
+        let quad = spinning_quad(local(-rim.center) / radius, local(*mirror), *spread, None);
+        quad.map(|corner| rim.center + (axes[0] * corner.x + axes[1] * corner.y) * radius)
+    };
+    let far_off = |spread_factor: f64| {
+        let off = |(case, found): (&(Ellipse, DVec3, f64), &[[f32; 4]; 4])| {
+            let expected = corners(&(case.0, case.1, (case.2 * spread_factor).min(1.0)));
+            // Both start at the corner towards the light; ours go around the other way.
+            let found = found.map(|[x, y, z, _]| DVec3::new(f64::from(x), f64::from(y), f64::from(z)));
+            let order = [0, 3, 2, 1];
+            order.iter().zip(expected).map(|(index, corner)| (found[*index] - corner).length()).fold(0.0, f64::max) / case.0.axis_a.length()
+        };
+        cases.iter().zip(&found).map(off).filter(|off| off.is_nan() || *off >= 1e-3).count()
+    };
+    // Where the point is right below the middle or the ray has no direction along the plane, any corner is the first.
+    assert!(far_off(1.0) < cases.len() / 500, "{} of {} are off", far_off(1.0), cases.len());
+    assert!(far_off(0.9) > cases.len() / 2, "another spread must not pass");
 }
