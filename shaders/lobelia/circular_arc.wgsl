@@ -61,12 +61,7 @@ fn arc_through(line: GreatArc, between: vec3f) -> CircularArc {
     return arc;
 }
 
-// How many arcs the visible part of a rim takes where a whole one takes `whole`.
-fn rim_arc_count(visible: VisibleRim, whole: u32) -> u32 {
-    return u32(max(ceil(f32(whole) * (visible.end - visible.start) * 0.159154943 - 1e-4), 1.0));
-}
-
-// The arc of that place among so many.
+// One of so many arcs of equal angle that make up the visible part of a rim. (As many whatever the part: were there fewer as a light sets, it would jump by what they are off.)
 fn rim_arc(rim: Rim, visible: VisibleRim, place: u32, count: u32) -> CircularArc {
     let turn = (visible.end - visible.start) / f32(count);
     let start = visible.start + turn * f32(place);

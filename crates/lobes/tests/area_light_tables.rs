@@ -97,8 +97,7 @@ fn nodes_of_ggx_half_vectors() {
     for alpha in [1e-3, 0.01, 0.05, 0.2, 0.4, 0.8] {
         for anisotropy in [0.0, 0.5, 0.8, 0.95] {
             for degrees in [0.0, 45.0, 70.0, 85.0] {
-                let of =
-                    |nodes| error_ggx(alpha, anisotropy, degrees, Fineness { nodes, arcs: 1 }, |numbers, mirror| quad(numbers, mirror));
+                let of = |nodes| error_ggx(alpha, anisotropy, degrees, Fineness { nodes, arcs: 1 }, quad);
                 let [two, three, four, six] = [2, 3, 4, 6].map(of);
                 println!("| {alpha}, {anisotropy}, {degrees} | {two:.1e} | {three:.1e} | {four:.1e} | {six:.1e} |");
                 let steep = degrees > 80.0;

@@ -6,7 +6,6 @@
 
 use super::boundary::Ellipse;
 use glam::DVec3;
-use std::f64::consts::TAU;
 
 /// Unit directions `((middle + opposite t^2) + 2 tangent t) / (1 + t^2)`, with t the tangent of half the angle from the middle, an angle within `half_angle`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,11 +67,8 @@ impl CircularArc {
     }
 }
 
-/// The part of a rim between two angles as circular arcs, as many as `whole`, which is three or more, for a whole turn.
-pub fn arcs_of(rim: &Ellipse, from: f64, to: f64, whole: u32) -> Vec<CircularArc> {
-    let count = (f64::from(whole.max(3)) * (to - from) / TAU - 1e-4).ceil().max(1.0);
-    let at = |place: f64| rim.point(from + (to - from) * place / count);
-    (0..count as u32)
-        .filter_map(|index| CircularArc::through(at(f64::from(index)), at(f64::from(index) + 0.5), at(f64::from(index) + 1.0)))
-        .collect()
+/// The part of a rim between two angles as that many circular arcs of equal angle, at least three for a whole turn.
+pub fn arcs_of(rim: &Ellipse, from: f64, to: f64, count: u32) -> Vec<CircularArc> {
+    let at = |place: f64| rim.point(from + (to - from) * place / f64::from(count));
+    (0..count).map(f64::from).filter_map(|index| CircularArc::through(at(index), at(index + 0.5), at(index + 1.0))).collect()
 }

@@ -25,7 +25,7 @@ use std::f64::consts::{FRAC_1_PI, TAU};
 pub struct Fineness {
     /// Quadrature nodes on either side of the place of an edge where half vectors come nearest to the normal.
     pub nodes: usize,
-    /// Circular arcs that a whole rim of a round light is taken for; exact for spheres.
+    /// Circular arcs that the visible part of a round light's rim is taken for, at least three; exact for spheres.
     pub arcs: u32,
 }
 
