@@ -44,11 +44,21 @@ struct Input {
     axis: [f32; 4],
 }
 
-struct Case {
-    light: Boundary,
-    axis: DVec3,
-    n: f64,
+/// An outline and a lobe about an axis.
+pub struct Case {
+    pub light: Boundary,
+    pub axis: DVec3,
+    pub n: f64,
     input: Input,
+}
+
+impl Case {
+    /// With what the device gets rounded to 32 bits.
+    pub fn new(corners: &[DVec3], axis: DVec3, n: f64) -> Self {
+        let (seen, n) = (axis.as_vec3(), n as f32);
+        let input = Input { row: row(corners), axis: seen.extend(n).to_array() };
+        Self { light: Boundary::polygon(corners), axis: seen.as_dvec3().normalize(), n: f64::from(n), input }
+    }
 }
 
 /// Exponents from 0 to 1e6, axes anywhere above the horizon, outlines from within the lobe to behind it; every eighth axis points exactly at a corner.
@@ -67,12 +77,11 @@ fn case(index: u32) -> Case {
         axis = corners[0].normalize();
     }
     // The device gets an axis that is unit but for rounding; so does the twin.
-    let (seen, n) = (axis.as_vec3(), n as f32);
-    let input = Input { row: row(&corners), axis: seen.extend(n).to_array() };
-    Case { light: Boundary::polygon(&corners), axis: seen.as_dvec3().normalize(), n: f64::from(n), input }
+    Case::new(&corners, axis, n)
 }
 
-fn on_device(cases: &[Case], flags: &[&str]) -> Option<Vec<[f32; 4]>> {
+/// Lobe fractions about one axis and about two.
+pub fn on_device(cases: &[Case], flags: &[&str]) -> Option<Vec<[f32; 4]>> {
     let inputs: Vec<Input> = cases.iter().map(|case| case.input).collect();
     let flags = flags.iter().fold(Flags::new(), |flags, flag| flags.with(flag, true));
     Some(evaluate(gpu()?, &format!("{WGSL}{WALK}"), &flags, &inputs).unwrap())
@@ -84,7 +93,7 @@ fn allowed(case: &Case, model: f64) -> f64 {
 }
 
 /// The largest error in units of what is allowed, and how many are further off. What is not a number is infinitely far off.
-fn misses(cases: &[Case], found: impl Iterator<Item = f64>, expected: impl Fn(&Case) -> f64, model: f64) -> (f64, usize) {
+pub fn misses(cases: &[Case], found: impl Iterator<Item = f64>, expected: impl Fn(&Case) -> f64, model: f64) -> (f64, usize) {
     let (mut worst, mut count) = (0f64, 0);
     for (case, found) in cases.iter().zip(found) {
         let over = (found - expected(case)).abs() / allowed(case, model);

@@ -154,9 +154,12 @@ fn case_of_rim(rim: &Ellipse, arcs: u32, Surface { view, alpha, stretch }: Surfa
 
 /// Mean half vectors and irradiance.
 fn on_device<Input: bytemuck::Pod>(wgsl: &str, cases: &[Case<Input>], anisotropic: bool) -> Option<Vec<(DVec3, f64)>> {
+    on_device_with(wgsl, cases, &if anisotropic { Flags::new().with("ANISOTROPIC", true) } else { Flags::new() })
+}
+
+fn on_device_with<Input: bytemuck::Pod>(wgsl: &str, cases: &[Case<Input>], flags: &Flags) -> Option<Vec<(DVec3, f64)>> {
     let inputs: Vec<Input> = cases.iter().map(|case| case.input).collect();
-    let flags = if anisotropic { Flags::new().with("ANISOTROPIC", true) } else { Flags::new() };
-    let found: Vec<[f32; 4]> = evaluate(gpu()?, wgsl, &flags, &inputs).unwrap();
+    let found: Vec<[f32; 4]> = evaluate(gpu()?, wgsl, flags, &inputs).unwrap();
     Some(found.iter().map(|[x, y, z, cosine]| (DVec3::new(f64::from(*x), f64::from(*y), f64::from(*z)), f64::from(*cosine))).collect())
 }
 
@@ -258,6 +261,25 @@ fn irradiance_of_ellipses() {
     }
 }
 
+/// An isotropic surface under a polygon: the mean half vector with six nodes on the device, the same with 64 in 64 bits, and what 32 bits may be off by.
+pub fn mean_of_polygons(lights: &[(Vec<DVec3>, DVec3, f64)]) -> Option<Vec<(DVec3, DVec3, f64)>> {
+    let cases: Vec<Case<PolygonInput>> = lights.iter().map(|(corners, view, alpha)| isotropic_case(corners, *view, *alpha)).collect();
+    let found = on_device_with(&format!("{POLYGONS}{WALK}"), &cases, &Flags::new().with("HALF_VECTOR_NODES_SIX", true))?;
+    let exact =
+        |case: &Case<PolygonInput>| ggx_half_vector_mean(&case.light, case.view, DVec2::splat(case.alpha), Fineness { nodes: 64, arcs: 1 });
+    Some(cases.iter().zip(&found).map(|(case, (mean, _))| (*mean, exact(case), allowed(case))).collect())
+}
+
+fn isotropic_case(corners: &[DVec3], view: DVec3, alpha: f64) -> Case<PolygonInput> {
+    Case {
+        light: Boundary::polygon(corners),
+        view,
+        alpha,
+        stretch: DVec2::ONE,
+        input: PolygonInput { row: row(corners), viewer: view.as_vec3().extend(alpha as f32).to_array(), stretch: [1.0; 4] },
+    }
+}
+
 /// Irradiance and lobe step by step.
 pub struct Track {
     /// On the device with three nodes.
@@ -268,17 +290,8 @@ pub struct Track {
 /// For lights seen from the origin; the lobe is the light that it reflects before masking and Fresnel.
 pub fn light_of(lights: &[Vec<DVec3>], view_degrees: f64, alpha: f64) -> Option<Track> {
     let angle = view_degrees.to_radians();
-    let view = DVec3::new(angle.sin(), 0.0, angle.cos()).as_vec3();
-    let cases: Vec<Case<PolygonInput>> = lights
-        .iter()
-        .map(|corners| Case {
-            light: Boundary::polygon(corners),
-            view: view.as_dvec3().normalize(),
-            alpha,
-            stretch: DVec2::ONE,
-            input: PolygonInput { row: row(corners), viewer: view.extend(alpha as f32).to_array(), stretch: [1.0; 4] },
-        })
-        .collect();
+    let view = DVec3::new(angle.sin(), 0.0, angle.cos()).as_vec3().as_dvec3().normalize();
+    let cases: Vec<Case<PolygonInput>> = lights.iter().map(|corners| isotropic_case(corners, view, alpha)).collect();
     track(&format!("{POLYGONS}{WALK}"), &cases)
 }
 

@@ -43,10 +43,11 @@ struct Input {
     viewer: [f32; 4],
 }
 
-struct Case {
-    light: Boundary,
-    view: DVec3,
-    alpha: f64,
+/// An outline, a viewer in the half plane y = 0, x >= 0, and a surface.
+pub struct Case {
+    pub light: Boundary,
+    pub view: DVec3,
+    pub alpha: f64,
     input: Input,
 }
 
@@ -62,18 +63,26 @@ fn case(index: u32) -> Case {
     let alpha = f64::from(10f64.powf(numbers.between(-3.0, 0.0)) as f32);
     let spread = 10f64.powf(numbers.between(-2.0, 0.5));
     let corners = outline(&mut numbers, DVec3::new(-view.x, 0.0, view.z), spread);
-    let input = Input { row: row(&corners), viewer: [view.x as f32, 0.0, view.z as f32, alpha as f32] };
-    Case { light: Boundary::polygon(&corners), view, alpha, input }
+    Case::new(&corners, view, alpha)
 }
 
-fn microfacets(alpha: f64, flag: &str) -> Microfacets {
+impl Case {
+    /// With what the device gets rounded to 32 bits.
+    pub fn new(corners: &[DVec3], view: DVec3, alpha: f64) -> Self {
+        let input = Input { row: row(corners), viewer: [view.x as f32, 0.0, view.z as f32, alpha as f32] };
+        Self { light: Boundary::polygon(corners), view, alpha, input }
+    }
+}
+
+pub fn microfacets(alpha: f64, flag: &str) -> Microfacets {
     match flag {
         "NDF_BECKMANN" => Microfacets::Beckmann { m: alpha },
         _ => Microfacets::Blinn { n: (2.0 / (alpha * alpha) - 2.0).max(0.0) },
     }
 }
 
-fn on_device(cases: &[Case], flags: &Flags) -> Option<Vec<(HalfVectorIntegral, f64)>> {
+/// Lobes and irradiance.
+pub fn on_device(cases: &[Case], flags: &Flags) -> Option<Vec<(HalfVectorIntegral, f64)>> {
     let inputs: Vec<Input> = cases.iter().map(|case| case.input).collect();
     let found: Vec<[[f32; 4]; 2]> = evaluate(gpu()?, &format!("{WGSL}{WALK}"), flags, &inputs).unwrap();
     let read = |[sums, cosine]: &[[f32; 4]; 2]| {
@@ -85,7 +94,7 @@ fn on_device(cases: &[Case], flags: &Flags) -> Option<Vec<(HalfVectorIntegral, f
 
 /// Rounding of directions to 32 bits turns half vectors by 2^-24 over their length, which is about twice the cosine of the view at grazing angles; relative to the
 /// lobe's width that is the error, times a few for the sums. Beyond 85 degrees the search for the nearest half vector may end elsewhere.
-fn allowed(case: &Case, rounding: f64) -> f64 {
+pub fn allowed(case: &Case, rounding: f64) -> f64 {
     let steep = if case.view.z > 0.08 { 10.0 } else { 40.0 };
     rounding + steep * 2f64.powi(-24) / (case.alpha * case.view.z)
 }

@@ -7,3 +7,4 @@ mod ggx;
 mod half_vectors;
 mod outlines;
 mod round;
+mod vectors;
