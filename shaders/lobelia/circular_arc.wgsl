@@ -29,9 +29,8 @@ fn arc_of_great_circle(arc: GreatArc) -> CircularArc {
 }
 
 // The circle through both ends of a straight line and a unit direction between them that is up to a third of the circle from both.
-fn arc_through(line: GreatArc, between: vec3f) -> CircularArc {
-    let great = arc_of_great_circle(line);
-    if line.length <= 0.0 {
+fn arc_through(great: CircularArc, between: vec3f) -> CircularArc {
+    if great.half_angle <= 0.0 {
         return great;
     }
     // Height above the plane of the straight line, and along that line.
@@ -61,12 +60,22 @@ fn arc_through(line: GreatArc, between: vec3f) -> CircularArc {
     return arc;
 }
 
-// One of so many arcs of equal angle that make up the visible part of a rim. (As many whatever the part: were there fewer as a light sets, it would jump by what they are off.)
+// Arcs that make up the outline of what is visible of a rim: `count` along the rim, and the horizon where that cuts it. (As many along the rim whatever is visible: were there fewer as a light
+// sets, it would jump by what they are off.)
+fn rim_arc_count(visible: VisibleRim, count: u32) -> u32 {
+    return select(count + 1u, count, visible.whole);
+}
+
 fn rim_arc(rim: Rim, visible: VisibleRim, place: u32, count: u32) -> CircularArc {
     let turn = (visible.end - visible.start) / f32(count);
     let start = visible.start + turn * f32(place);
-    let line = great_arc(rim_point(rim, start), rim_point(rim, start + turn));
-    return arc_through(line, safe_normalize(rim_point(rim, start + 0.5 * turn), line.start));
+    let is_horizon = place == count;
+    let line = great_arc(rim_point(rim, start), rim_point(rim, select(start + turn, visible.start, is_horizon)));
+    let great = arc_of_great_circle(line);
+    if is_horizon {
+        return great;
+    }
+    return arc_through(great, safe_normalize(rim_point(rim, start + 0.5 * turn), great.middle));
 }
 
 // What an arc above the horizon adds to the integral of cos du: Lambert's formula (1760), and its like along a circle.

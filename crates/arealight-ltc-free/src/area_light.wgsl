@@ -6,7 +6,7 @@
 #import lobelia::axial_moment::{AxialMoment, add_moment_edge, add_power_edge, lobe_fraction, two_axis_moment}
 #import lobelia::brdf::{Brdf, brdf_from_surface, fresnel, ggx_visibility, phong_exponent, phong_visibility, specular_albedo}
 #import lobelia::cosine_lobe::cosine_lobe_evaluate
-#import lobelia::circular_arc::{CircularArc, arc_of_great_circle, irradiance_along, rim_arc}
+#import lobelia::circular_arc::{CircularArc, arc_of_great_circle, irradiance_along, rim_arc, rim_arc_count}
 #import lobelia::ggx_half_vector::{add_ggx_arc, ggx_mean}
 #import lobelia::half_vector_integral::{HalfVectorSum, add_half_vector_edge}
 #import lobelia::light_outline::{GreatArc, OutlineLine, OutlineWalk, great_arc, lambert_edge, rim_point, spinning_quad, take_horizon, visible_rim, walk_outline}
@@ -346,12 +346,12 @@ fn over_polygon(outline: Outline, frame: SurfaceFrame, alpha: f32) -> LightSum {
 // Arcs of a circle that is seen as one; more would be no better.
 const CIRCLE_ARCS: u32 = 4u;
 
-// Circular arcs along the rim above the horizon, and the horizon between its ends.
 fn over_rim(outline: Outline, frame: SurfaceFrame, alpha: f32) -> LightSum {
     var sum: LightSum;
     let visible = visible_rim(outline.rim);
     let count = select(outline.count, CIRCLE_ARCS, outline.circle);
-    for (var place = 0u; place < count; place++) {
+    let all = rim_arc_count(visible, count);
+    for (var place = 0u; place < all; place++) {
         let arc = rim_arc(outline.rim, visible, place, count);
         sum.cosine += irradiance_along(arc);
 #ifdef SPECULAR
@@ -359,10 +359,6 @@ fn over_rim(outline: Outline, frame: SurfaceFrame, alpha: f32) -> LightSum {
         add_specular_arc(&specular, arc, frame.viewer, alpha);
         sum.specular = specular;
 #endif
-    }
-    if !visible.whole {
-        let ends = OutlineLine(rim_point(outline.rim, visible.end), rim_point(outline.rim, visible.start));
-        add_line(&sum, ends, frame.viewer, alpha);
     }
     return sum;
 }

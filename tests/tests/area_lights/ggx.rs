@@ -48,9 +48,9 @@ struct PolygonInput {
     stretch: [f32; 4],
 }
 
-const ROUND: &str = "#import lobelia::circular_arc::{arc_of_great_circle, irradiance_along, rim_arc}
+const ROUND: &str = "#import lobelia::circular_arc::{irradiance_along, rim_arc, rim_arc_count}
 #import lobelia::ggx_half_vector::{add_ggx_arc, ggx_mean}
-#import lobelia::light_outline::{great_arc, rim_of_disk, rim_point, visible_rim}
+#import lobelia::light_outline::{rim_of_disk, visible_rim}
 struct Input { center: vec4f, a: vec4f, b: vec4f, viewer: vec4f, stretch: vec4f }
 struct Output { mean: vec4f }
 fn evaluate(input: Input) -> Output {
@@ -60,15 +60,10 @@ fn evaluate(input: Input) -> Output {
     let count = u32(input.center.w);
     var sum = vec3f(0.0);
     var cosine = 0.0;
-    for (var place = 0u; place < count; place++) {
+    for (var place = 0u; place < rim_arc_count(visible, count); place++) {
         let arc = rim_arc(rim, visible, place, count);
         add_ggx_arc(&sum, arc, input.viewer.xyz, stretch);
         cosine += irradiance_along(arc);
-    }
-    if !visible.whole {
-        let horizon = arc_of_great_circle(great_arc(rim_point(rim, visible.end), rim_point(rim, visible.start)));
-        add_ggx_arc(&sum, horizon, input.viewer.xyz, stretch);
-        cosine += irradiance_along(horizon);
     }
     return Output(vec4f(ggx_mean(sum, stretch), cosine));
 }";
