@@ -1,10 +1,10 @@
-//! What specialising to a scene saves: time and memory of `graphs/indirect.ron` on the diffuse box, with and without, in turn within one run.
+//! What specialising to a scene saves: time and memory of graphs on scenes that have less than they could serve, with and without, in turn within one run.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use lobelia::{
     frame::SceneWorld,
-    graph::{GraphFile, PlanOptions, RunOptions, Runner, testing},
+    graph::{Gpu, GraphFile, PlanOptions, RunOptions, Runner, testing},
     scene::{
         Scene,
         device::{GpuScene, ViewUniform},
@@ -18,15 +18,48 @@ use std::{
 
 const EXTENT: [u32; 2] = [160, 160];
 
+/// A graph on a scene that has less than the graph could serve.
+struct Case {
+    name: &'static str,
+    graph: &'static str,
+    variants: &'static [&'static str],
+    set: &'static [&'static str],
+    scene: Scene,
+}
+
+fn cases() -> [Case; 2] {
+    let mut polygons = Scene::load("builtin:area-lights").unwrap();
+    // The quad, the triangle and the star come first.
+    polygons.area_lights.truncate(3);
+    polygons.instances.retain(|instance| instance.area_light.is_none_or(|light| light < 3));
+    [
+        Case {
+            name: "indirect light of the diffuse box",
+            graph: "indirect.ron",
+            variants: &["no-visibility"],
+            set: &["lights.count=256"],
+            scene: Scene::load("builtin:cornell-diffuse").unwrap(),
+        },
+        Case { name: "area lights, polygons alone", graph: "area-lights.ron", variants: &["no-visibility"], set: &[], scene: polygons },
+    ]
+}
+
 fn specialising(criterion: &mut Criterion) {
     let gpu = testing::gpu().expect("this benchmark needs a device");
-    let scene = Arc::new(Scene::load("builtin:cornell-diffuse").unwrap());
+    for case in cases() {
+        measure(criterion, gpu, case);
+    }
+}
+
+fn measure(criterion: &mut Criterion, gpu: &Gpu, case: Case) {
+    let scene = Arc::new(case.scene);
     let world = GpuScene::new(gpu.device(), gpu.queue(), scene.clone()).unwrap();
     let view = ViewUniform::new(&scene.camera(None).unwrap(), scene.origin(), EXTENT, glam::Vec2::ZERO, 0, 0, None);
     world.set_view(gpu.queue(), &view);
-    let graph = GraphFile::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../graphs/indirect.ron")).unwrap();
-    let set = ["lights.count=256".parse().unwrap()];
-    let wired = graph.wire(&lobelia::registry(), &["no-visibility".into()], &set).unwrap();
+    let graph = GraphFile::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../graphs").join(case.graph)).unwrap();
+    let set: Vec<_> = case.set.iter().map(|text| text.parse().unwrap()).collect();
+    let variants: Vec<String> = case.variants.iter().map(|variant| (*variant).to_owned()).collect();
+    let wired = graph.wire(&lobelia::registry(), &variants, &set).unwrap();
     let runner = |specialise: bool| {
         let plan = wired.plan(&scene.traits(), &PlanOptions { specialise, ..PlanOptions::new(EXTENT) }).unwrap();
         (plan.bytes(), Runner::<SceneWorld>::new(gpu, plan, &world, RunOptions::default()).unwrap())
@@ -39,7 +72,7 @@ fn specialising(criterion: &mut Criterion) {
         gpu.wait().unwrap();
         clock.elapsed()
     };
-    let mut group = criterion.benchmark_group("frame of the diffuse box");
+    let mut group = criterion.benchmark_group(case.name);
     group.sample_size(20);
     for (name, side) in [("specialised", true), ("general", false)] {
         group.bench_function(name, |bencher| bencher.iter_custom(|count| (0..count).map(|_| timed(side)).sum()));
@@ -58,7 +91,8 @@ fn specialising(criterion: &mut Criterion) {
     let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
     let device = gpu.info().map_or("host device", |info| info.name.as_str());
     println!(
-        "interleaved on {device}: specialised {with:.1} ms and {:.2} MiB, general {without:.1} ms and {:.2} MiB; time ratio {:.3}, memory ratio {:.3}",
+        "{}: interleaved on {device}: specialised {with:.1} ms and {:.2} MiB, general {without:.1} ms and {:.2} MiB; time ratio {:.3}, memory ratio {:.3}",
+        case.name,
         mebibytes(special_bytes),
         mebibytes(general_bytes),
         with / without,

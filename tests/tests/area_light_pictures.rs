@@ -206,3 +206,31 @@ fn what_cannot_be_asked_is_refused() {
     assert!(ask(Ndf::Ggx, &[], &["area.anisotropy=1"]).contains("anisotropy"));
     assert!(ask(Ndf::Ggx, &["monte-carlo"], &["area.samples=0"]).contains("samples"));
 }
+
+/// Plans alone: no device is needed.
+#[test]
+fn what_a_scene_does_not_have_is_left_out() {
+    let graph = lobelia::graph::GraphFile::load(&lobelia_tests::root().join("graphs/area-lights.ron")).unwrap();
+    let plan = |scene: &lobelia::scene::Scene| {
+        let wired = graph.wire(&lobelia::registry(), &["no-visibility".into()], &[]).unwrap();
+        wired.plan(&scene.traits(), &lobelia::graph::PlanOptions::new([16, 9])).unwrap()
+    };
+    let flags = |scene: &lobelia::scene::Scene| -> Vec<&'static str> {
+        let plan = plan(scene);
+        let area = plan.passes.iter().find(|pass| pass.name == "area").unwrap();
+        let shapes = ["POLYGON_LIGHTS", "DISK_LIGHTS", "SPHERE_LIGHTS", "ROUND_ARCS"];
+        area.specialisations.iter().filter(|flag| flag.on && shapes.contains(&flag.flag)).map(|flag| flag.flag).collect()
+    };
+    let mut scene = lobelia::scene::Scene::load("builtin:area-lights").unwrap();
+    assert_eq!(flags(&scene), ["POLYGON_LIGHTS", "DISK_LIGHTS", "SPHERE_LIGHTS", "ROUND_ARCS"]);
+    // The quad, the triangle and the star come first.
+    scene.area_lights.truncate(3);
+    scene.instances.retain(|instance| instance.area_light.is_none_or(|light| light < 3));
+    assert_eq!(flags(&scene), ["POLYGON_LIGHTS"]);
+    let without = plan(&lobelia::scene::Scene::load("builtin:cornell-glossy").unwrap());
+    assert!(
+        without.dropped.iter().any(|dropped| dropped.pass == "area" && dropped.reason.contains("no area light")),
+        "{:?}",
+        without.dropped
+    );
+}

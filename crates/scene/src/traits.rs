@@ -121,7 +121,11 @@ impl SceneTraits {
 
     /// The same scene with every fact set that only permits leaving something out.
     pub fn unspecialised(&self) -> Self {
+        // Code for every shape of area light, where there is one at all.
+        let shapes = usize::from(self.area_lights() > 0);
         Self {
+            disk_lights: self.disk_lights.max(shapes),
+            sphere_lights: self.sphere_lights.max(shapes),
             specular: true,
             metallic: true,
             normal_maps: true,
