@@ -5,7 +5,7 @@ use crate::{
     twin::{Expected, Row, Twin},
 };
 use glam::{DVec2, DVec3};
-use lobelia_lobes::{brdf::*, octahedral::*, specular_albedo::specular_albedo_fit};
+use lobelia_lobes::{anisotropic_ggx, brdf::*, octahedral::*, specular_albedo::specular_albedo_fit};
 
 /// A normal in `a`, alpha beside it, and a half vector in `b`, mostly where a lobe of that alpha is.
 fn normal_and_half_vector(index: u32) -> Row {
@@ -22,6 +22,18 @@ fn cosines(index: u32) -> Row {
     let cosine = |draw: &mut Draw| if draw.one_in(3) { draw.log_between(1e-6, 1.0) } else { 1.0 - draw.unit() };
     let (l, v) = (cosine(&mut draw), cosine(&mut draw));
     row([[draw.log_between(1e-3, 1.0), l, v, 0.0], [0.0; 4], [0.0; 4], [0.0; 4]])
+}
+
+/// Alpha and anisotropy up to 0.95 in `a`; two directions above the horizon in `b` and `c`, grazing ones among them.
+fn anisotropic_surface(index: u32) -> Row {
+    let mut draw = Draw::new(index, 106);
+    let surface = [draw.log_between(1e-3, 1.0), draw.between(-0.95, 0.95), 0.0, 0.0];
+    let mut upper = || {
+        let direction = draw.direction();
+        let height = if draw.one_in(3) { draw.log_between(1e-6, 1.0) } else { direction.z.abs().max(1e-6) };
+        group(direction.with_z(0.0).normalize_or(DVec3::X) * (1.0 - height * height).sqrt() + DVec3::Z * height, 0.0)
+    };
+    row([surface, upper(), upper(), [0.0; 4]])
 }
 
 /// A direction above the horizon in `a`.
@@ -142,6 +154,30 @@ fn value(input: Input) -> vec4f { return vec4f(phong_distribution(input.a.w, inp
                 };
                 let value = phong_visibility(row[0], row[1], row[2]);
                 vec![Expected::relative(value, 5e-6 + near(row[1]) + near(row[2])).non_negative()]
+            },
+        },
+        Twin {
+            name: "anisotropic_ggx::anisotropic_ggx_distribution",
+            wgsl: "#import lobelia::anisotropic_ggx::{anisotropic_alphas, anisotropic_ggx_distribution}
+fn value(input: Input) -> vec4f { return vec4f(anisotropic_ggx_distribution(anisotropic_alphas(input.a.x, input.a.y), input.b.xyz)); }",
+            domain: "alpha 1e-3 to 1, anisotropy -0.95 to 0.95; half vectors above the horizon",
+            input: anisotropic_surface,
+            expected: |row| {
+                let alphas = anisotropic_ggx::alphas(row[0], row[1]);
+                // Twice that of 1 - anisotropy, and as much of the rest.
+                vec![Expected::relative(anisotropic_ggx::distribution(alphas, direction_of(row, 1)), 6e-6).non_negative()]
+            },
+        },
+        Twin {
+            name: "anisotropic_ggx::anisotropic_ggx_visibility",
+            wgsl: "#import lobelia::anisotropic_ggx::{anisotropic_alphas, anisotropic_ggx_visibility}
+fn value(input: Input) -> vec4f { return vec4f(anisotropic_ggx_visibility(anisotropic_alphas(input.a.x, input.a.y), input.b.xyz, input.c.xyz)); }",
+            domain: "alpha 1e-3 to 1, anisotropy -0.95 to 0.95; both directions above the horizon",
+            input: anisotropic_surface,
+            expected: |row| {
+                let alphas = anisotropic_ggx::alphas(row[0], row[1]);
+                let value = anisotropic_ggx::visibility(alphas, direction_of(row, 1), direction_of(row, 2));
+                vec![Expected::relative(value, 5e-6).non_negative()]
             },
         },
         albedo_twin!("GGX", "", Distribution::Ggx),
