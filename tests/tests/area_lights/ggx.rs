@@ -205,6 +205,37 @@ fn round_lights_hold_in_32_bits() {
     }
 }
 
+/// Edges of a small light cancel, and what is left keeps the digits that directions in 32 bits have over the light's size: no other form is needed for small lights.
+#[test]
+fn small_lights_keep_their_digits() {
+    for size in [1e-1, 1e-2, 1e-3, 1e-4] {
+        let lights: Vec<(Vec<DVec3>, DVec3, f64)> = (0..4000)
+            .map(|index| {
+                let mut numbers = Numbers::new(index);
+                let Surface { view, alpha, .. } = surface(&mut numbers, 1, false);
+                let alpha = alpha.max(0.05);
+                let center = (DVec3::new(-view.x, -view.y, view.z) + numbers.direction() * (0.5 * alpha)).normalize();
+                let center = center.with_z(center.z.abs() + 0.1);
+                let (a, b) = center.normalize().any_orthonormal_pair();
+                let corners = [a + b, a - b, -a - b, b - a].map(|corner| (center + corner * size).as_vec3().as_dvec3());
+                (corners.to_vec(), view, alpha)
+            })
+            .collect();
+        let Some(means) = mean_of_polygons(&lights) else { return };
+        let off = |factor: f64| {
+            let mut relative: Vec<f64> =
+                means.iter().map(|(found, exact, _)| (*found - *exact * factor).length() / exact.length()).collect();
+            relative.sort_by(f64::total_cmp);
+            (relative[relative.len() / 2], relative[relative.len() * 99 / 100])
+        };
+        let (median, most) = off(1.0);
+        println!("size {size}: relative error {median:.1e} in the median, {most:.1e} in 99 of 100");
+        let (median_allowed, most_allowed) = (4e-5 + 2e-8 / size, 2e-4 + 4e-7 / size);
+        assert!(median < median_allowed && most < most_allowed, "size {size}: {median}, {most}");
+        assert!(off(1.0 + 2.0 * median_allowed).0 > median_allowed, "size {size}: a brighter light must not pass");
+    }
+}
+
 /// Of at most pi. Along circles the integral is exact: that of a sphere is so with four arcs.
 #[test]
 fn irradiance_along_circles() {
