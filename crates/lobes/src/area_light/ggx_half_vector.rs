@@ -7,8 +7,8 @@
 //! Along a straight edge, or any circle that is seen from the shading point, half vectors are up to their length quadratic in the tangent of half the angle along it, and so is u. What is integrated is the ratio of a polynomial of
 //! degree 2 and one of degree 4, whose complex roots tell where it peaks and how wide.
 //!
-//! That GGX is a cosine lobe of stretched directions is known from linearly transformed cosines (Heitz et al. 2016, section 3); its use in half vectors, the quadratic and the
-//! quadrature are designs of this project.
+//! GGX is the distribution of an ellipsoid's normals (Trowbridge and Reitz 1975, Average irregularity representation of a rough surface for ray reflection), and an ellipsoid is a stretched sphere,
+//! whose projected normals are a clamped cosine. Its use in half vectors, the quadratic and the quadrature are designs of this project.
 //!
 //! Everything is in the frame of the surface: z along the normal, x along the tangent of anisotropic surfaces. The twin on the device is `lobelia::ggx_half_vector`.
 
