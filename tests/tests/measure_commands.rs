@@ -275,3 +275,28 @@ fn rows_that_cannot_be_written_end_in_a_message() {
     std::fs::create_dir(place.path("rows/rows.jsonl")).unwrap();
     assert!(place.bad("sweep s.ron --report rows -q", 1).contains("rows.jsonl"));
 }
+
+/// What is saved of a picture of several samples is their average, whatever the file.
+#[test]
+fn saved_radiances_are_averages() {
+    if !has_gpu() {
+        return;
+    }
+    let place = Place::new();
+    let saves = "--save direct.radiance=a.exr --save direct.radiance=a.npz";
+    place.good(&format!("render GRAPHS/direct.ron --size 16x16 --samples 4 -q {saves}"));
+    place.good("render GRAPHS/direct.ron --size 16x16 --samples 1 -q --save direct.radiance=one.npz");
+    let picture = read_exr(&place.0.path().join("a.exr")).unwrap();
+    let array = |name: &str| -> Vec<f32> {
+        let mut file = npyz::npz::NpzArchive::open(place.0.path().join(name)).unwrap();
+        let array = file.by_name("image").unwrap().unwrap();
+        assert_eq!(array.shape(), [16, 16, 4]);
+        array.into_vec().unwrap()
+    };
+    let off = |values: &[f32]| {
+        let texels = values.chunks(4).zip(&picture.pixels);
+        texels.flat_map(|(texel, pixel)| (0..3).map(|channel| (texel[channel] - pixel[channel]).abs())).fold(0.0f32, f32::max)
+    };
+    assert!(off(&array("a.npz")) == 0.0, "the two files differ by {}", off(&array("a.npz")));
+    assert!(off(&array("one.npz")) > 0.0, "a single sample must not pass");
+}

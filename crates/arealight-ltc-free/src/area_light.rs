@@ -118,9 +118,9 @@ pub struct Params {
     #[param(range = 2..=6)]
     pub boundary_nodes: u32,
     /// What stands for the rim of a disk, a sphere or a map of one: arcs of circles as the surface sees them (`arcs`; for GGX by `exact_boundary`, other lobes take the polygon), the regular
-    /// polygon of equal area (`polygon`), or the quad of Lecocq et al. 2017 that turns with the mirror direction (`spinning_quad`; 10 to 20 % off).
+    /// polygon of equal area (`polygon`), or the quad of Lecocq et al. 2017 that turns with the mirror direction (`spinning_quad`; 10 to 25 % off).
     pub round: Round,
-    /// Arcs of a whole rim; spheres are exact with their four. Relative error for ellipses: 0.2 % with 8, 0.02 % with 16.
+    /// Arcs of a whole rim; spheres are exact with their four. Relative error for ellipses: 0.2 % with 8 (3 % where a sharp lobe ends at the rim), 0.02 % with 16.
     #[param(range = 4..=64)]
     pub round_arcs: u32,
     /// Corners of the polygon.

@@ -100,6 +100,15 @@ pub fn write_npz(path: &Path, parts: &[(Part, PartData)]) -> Result<(), Failure>
     })
 }
 
+/// Writes a radiance as a NumPy array `image` of height, width and four channels, the last of which is 1.
+pub fn write_radiance_npz(path: &Path, picture: &Image) -> Result<(), Failure> {
+    let values = picture.pixels.iter().flat_map(|[r, g, b]| [*r, *g, *b, 1.0]).collect();
+    atomically(path, |file| {
+        let mut archive = npyz::npz::NpzWriter::new(std::io::BufWriter::new(file));
+        append(&mut archive, "image", &[picture.height as u64, picture.width as u64, 4], values).map_err(|error| error.to_string())
+    })
+}
+
 type Archive<'a> = npyz::npz::NpzWriter<std::io::BufWriter<&'a mut std::fs::File>>;
 
 fn write_array(archive: &mut Archive<'_>, part: &Part, data: &PartData) -> std::io::Result<()> {

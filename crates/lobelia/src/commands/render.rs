@@ -53,7 +53,7 @@ pub struct Arguments {
     /// Seed of everything random; equal seeds give equal pictures.
     #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     seed: u32,
-    /// Write any resource of the graph: .exr (radiance), .png (display image or radiance), .npz (anything).
+    /// Write any resource of the graph: .exr (radiance), .png (display image or radiance), .npz (anything). Radiances are averaged over the samples; everything else is that of the last frame.
     #[arg(long = "save", value_name = "PASS.PORT=FILE", value_parser = parse_save)]
     saves: Vec<(String, PathBuf)>,
     /// Write a trace of CPU and device work that Perfetto and chrome://tracing open.
@@ -222,6 +222,7 @@ fn show_step(bar: &ProgressBar, shot: &Shot, step: &Step) -> bool {
 fn save(rendering: &Rendering<'_>, port: &str, path: &Path) -> Result<(), Failure> {
     let type_name = type_of(rendering.plan(), port);
     match files::kind_of(path, allowed_kinds(type_name))? {
+        Kind::Npz if type_name == Radiance::NAME => files::write_radiance_npz(path, &rendering.radiance(port)?),
         Kind::Npz => files::write_npz(path, &rendering.runner().read(rendering.gpu(), port)?),
         Kind::Exr => files::write_exr(path, &rendering.radiance(port)?),
         Kind::Png if type_name == Radiance::NAME => files::write_linear_png(path, &rendering.radiance(port)?),
