@@ -52,6 +52,7 @@ pub struct VsglLightsParams {
     #[param(range = 1.0..)]
     pub edges: OrNone<f32>,
     /// Least radius of a light, in units of that of a flat patch of its share: among leaves and folds patches find no room to grow, and would be points.
+    /// Larger: fewer spots, but more of the light that folds and contacts send each other is lost.
     #[param(range = 0.0..=4.0)]
     pub least_radius: f32,
     /// Shrink patches from frame to frame, each frame with lights of its own, so that the mean over frames converges (with the pass `progressive`, and
@@ -63,7 +64,7 @@ pub struct VsglLightsParams {
 
 impl Default for VsglLightsParams {
     fn default() -> Self {
-        Self { count: 1024, overlap: 2.0, kernel: Kernel::Mean, edges: OrNone::Value(3.0), least_radius: 1.0, shrink: false, seed: 0 }
+        Self { count: 1024, overlap: 2.0, kernel: Kernel::Mean, edges: OrNone::Value(3.0), least_radius: 0.7, shrink: false, seed: 0 }
     }
 }
 
