@@ -58,7 +58,7 @@ fn is_sphere(light: AreaLight) -> bool {
 }
 #endif
 
-// No corners from behind a one-sided light, from its plane, or from inside a sphere. `sides` are those of the polygon that stands for a rim.
+// No corners from behind a one-sided light, from its plane, or from inside a sphere. `sides`: how many corners or arcs stand for a rim.
 fn area_light_outline(light: AreaLight, frame: SurfaceFrame, sides: u32) -> Outline {
     var outline: Outline;
     let offset = light.center - frame.position;

@@ -71,7 +71,7 @@ fn rim_corner(rim: Rim, corner: u32, sides: u32) -> vec3f {
 }
 
 // The quad that stands for a rim and turns with the mirror direction: its corners are those at f = 0, pi/2, pi and 3 pi/2 of what this returns. `spread` is sqrt(2 / (n + 2)) for a lobe of
-// exponent n; at 1 areas are equal. Lecocq et al. 2017, algorithm 3 with its errata; an error of 10 to 20 % in the lobe.
+// exponent n; at 1 areas are equal. Lecocq et al. 2017, algorithm 3 with its errata; an error of 10 to 25 % in the lobe.
 fn spinning_quad(rim: Rim, mirror: vec3f, spread: f32) -> Rim {
     // Coordinates in which the rim is the unit circle, up to a factor.
     let normal = cross(rim.axis_a, rim.axis_b);

@@ -9,7 +9,7 @@
 #define_import_path lobelia::radial_primitive
 
 #import lobelia::brdf::phong_exponent
-#import lobelia::math::{INV_PI, PI, decay_mean, erf_mean, erfc, log_one_plus}
+#import lobelia::math::{INV_PI, decay_mean, erf_mean, erfc, log_one_plus}
 
 struct RadialPrimitive {
     // H / (1 - z), finite at z = 1.

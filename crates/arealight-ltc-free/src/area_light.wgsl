@@ -17,7 +17,7 @@
 
 struct Settings {
     light_count: u32,
-    // Of the polygon that stands for a round light.
+    // Corners or arcs that stand for a rim.
     sides: u32,
     // Scene axis whose part along a surface is its tangent.
     tangent: u32,
