@@ -4,34 +4,15 @@
 
 mod common;
 
-use common::{given, triple, vector};
-use glam::DVec3;
+use common::{
+    area_lights::{polygon, records},
+    given, triple, vector,
+};
 use lobelia_lobes::{
     area_light::{axial_moment::*, boundary::*, edge_models::*, half_vector::*, radial_primitive::*, round::*},
     cosine_lobe::*,
 };
 use serde_json::Value;
-
-const BUILT_IN: &str = include_str!("data/area-lights.json");
-
-/// The records under a key; a file without any fails the test.
-fn records(key: &str) -> Vec<Value> {
-    let text = match std::env::var("LOBELIA_AREA_LIGHT_VECTORS") {
-        Ok(path) if !path.is_empty() => {
-            std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("LOBELIA_AREA_LIGHT_VECTORS: {path}: {error}"))
-        }
-        _ => BUILT_IN.to_owned(),
-    };
-    let file: Value = serde_json::from_str(&text).unwrap_or_else(|error| panic!("the file of reference values is no JSON: {error}"));
-    assert_eq!(file["meta"]["schema"], "area-lights/1");
-    let found = file[key].as_array().unwrap_or_else(|| panic!("the file of reference values has no list `{key}`"));
-    assert!(!found.is_empty(), "`{key}` is empty");
-    found.clone()
-}
-
-fn polygon(record: &Value) -> Vec<DVec3> {
-    record["vertices"].as_array().unwrap().iter().map(triple).collect()
-}
 
 /// Relative to the value, or to a scale below which the reference itself has no digits.
 fn equal(got: f64, want: f64, relative: f64, scale: f64, what: &str, record: &Value) {

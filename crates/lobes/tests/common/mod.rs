@@ -1,6 +1,8 @@
 //! Reference values: the built-in file, or the one that `LOBELIA_LOBE_VECTORS` names (schema `spherical-gaussians/1`).
 #![allow(clippy::unwrap_used, dead_code)]
 
+pub mod area_lights;
+
 use glam::DVec3;
 use serde_json::Value;
 
