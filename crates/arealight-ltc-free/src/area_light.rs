@@ -1,9 +1,9 @@
 //! The `area-light` pass.
 
-use lobelia_frame::{AreaLightVisibility, Axis, GBuffer, ImageShape, Radiance, SceneWorld};
+use lobelia_frame::{AreaLightVisibility, Axis, GBuffer, ImageShape, LightClass, LightTransport, Radiance, SceneWorld};
 use lobelia_graph::{
-    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, ParamValue, Pass, PlanContext, PortError,
-    Ports, RunError, Specialisation, TraitsOf,
+    BuildError, ClaimOf, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, ParamValue, Pass, PlanContext,
+    PortError, Ports, RunError, Specialisation, TraitsOf,
 };
 use lobelia_scene::Ndf;
 use lobelia_shaders::Source;
@@ -192,6 +192,10 @@ impl Pass for AreaLightPass {
 
     fn need(_: &Params, traits: &TraitsOf<Self>) -> Need {
         if traits.area_lights() > 0 { Need::Run } else { Need::Omit("the scene has no area light".into()) }
+    }
+
+    fn claim(_: &Params, _: &TraitsOf<Self>) -> Option<ClaimOf<Self>> {
+        Some(LightTransport::of(LightClass::Area, [1]))
     }
 
     fn specialise(context: &PlanContext<'_, Self>, inputs: &InputShapes<Self>) -> Vec<Specialisation> {

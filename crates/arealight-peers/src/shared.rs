@@ -2,10 +2,10 @@
 //! sends, and its settings.
 
 use crate::table::LtcTable;
-use lobelia_frame::{AreaLightVisibility, Axis, GBuffer, ImageShape, Radiance, SceneWorld};
+use lobelia_frame::{AreaLightVisibility, Axis, GBuffer, ImageShape, LightClass, LightTransport, Radiance, SceneWorld};
 use lobelia_graph::{
-    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, Params, Pass, PlanContext, PortError,
-    Ports, RunError, Specialisation, TraitsOf,
+    BuildError, ClaimOf, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, Params, Pass, PlanContext,
+    PortError, Ports, RunError, Specialisation, TraitsOf,
 };
 use lobelia_scene::{AreaShape, Ndf, Scene, triangulate};
 use lobelia_shaders::Source;
@@ -108,6 +108,10 @@ impl<T: Technique> Pass for PeerPass<T> {
 
     fn need(_: &T::Params, traits: &TraitsOf<Self>) -> Need {
         if traits.area_lights() > 0 { Need::Run } else { Need::Omit("the scene has no area light".into()) }
+    }
+
+    fn claim(_: &T::Params, _: &TraitsOf<Self>) -> Option<ClaimOf<Self>> {
+        Some(LightTransport::of(LightClass::Area, [1]))
     }
 
     fn specialise(context: &PlanContext<'_, Self>, inputs: &InputShapes<Self>) -> Vec<Specialisation> {

@@ -1,9 +1,9 @@
 //! The `direct` pass.
 
-use lobelia_frame::{GBuffer, ImageShape, Radiance, ReflectiveShadowMap, SceneWorld};
+use lobelia_frame::{GBuffer, ImageShape, LightClass, LightTransport, Radiance, ReflectiveShadowMap, SceneWorld};
 use lobelia_graph::{
-    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, ParamValue, Pass, PlanContext, PortError,
-    Ports, RunError, Specialisation, TraitsOf,
+    BuildError, ClaimOf, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, ParamValue, Pass, PlanContext,
+    PortError, Ports, RunError, Specialisation, TraitsOf,
 };
 use lobelia_scene::Ndf;
 use lobelia_shaders::Source;
@@ -99,6 +99,10 @@ impl Pass for DirectPass {
 
     fn need(_: &Params, traits: &TraitsOf<Self>) -> Need {
         if traits.punctual_lights() > 0 { Need::Run } else { Need::Omit("the scene has no point, spot or directional light".into()) }
+    }
+
+    fn claim(_: &Params, _: &TraitsOf<Self>) -> Option<ClaimOf<Self>> {
+        Some(LightTransport::of(LightClass::Punctual, [1]))
     }
 
     fn specialise(context: &PlanContext<'_, Self>, inputs: &InputShapes<Self>) -> Vec<Specialisation> {

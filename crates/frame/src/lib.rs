@@ -28,6 +28,7 @@ pub use area_light_visibility::{AreaLightVisibility, AreaLightVisibilityShape};
 pub use axis::Axis;
 pub use gbuffer::{GBuffer, GBufferShape, SurfaceFlags, SurfaceFormats};
 pub use light::{LightVisibility, LightVisibilityShape, VirtualLight, VirtualLightLobes, VirtualLights, VirtualLightsShape};
+pub use lobelia_scene::{LightClass, LightTransport};
 pub use patch_moments::{LobeLength, PatchMoments, PatchMomentsShape};
 pub use radiance::{DisplayImage, ImageShape, Radiance};
 pub use reflective_shadow_map::{ReflectiveShadowMap, ReflectiveShadowMapShape, RsmFace};

@@ -1,5 +1,5 @@
 use lobelia_graph::World;
-use lobelia_scene::{SceneTraits, device::GpuScene};
+use lobelia_scene::{LightTransport, SceneTraits, device::GpuScene};
 
 /// The world that the built-in passes run on: a scene of `lobelia-scene`.
 pub struct SceneWorld;
@@ -7,6 +7,8 @@ pub struct SceneWorld;
 impl World for SceneWorld {
     type Traits = SceneTraits;
     type Device = GpuScene;
+    /// Which light, after how many scattering events.
+    type Claim = LightTransport;
 
     fn unspecialised(traits: &SceneTraits) -> SceneTraits {
         traits.unspecialised()

@@ -1,9 +1,9 @@
 //! The `emission` pass.
 
-use lobelia_frame::{GBuffer, ImageShape, Radiance, SceneWorld};
+use lobelia_frame::{GBuffer, ImageShape, LightTransport, Radiance, SceneWorld};
 use lobelia_graph::{
-    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, NoParams, OutputShapes, Pass, PlanContext, PortError,
-    Ports, RunError, Specialisation, TraitsOf,
+    BuildError, ClaimOf, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, NoParams, OutputShapes, Pass, PlanContext,
+    PortError, Ports, RunError, Specialisation, TraitsOf,
 };
 use lobelia_shaders::Source;
 
@@ -49,6 +49,10 @@ impl Pass for EmissionPass {
         } else {
             Need::Omit("the scene has no emissive material and no environment map".into())
         }
+    }
+
+    fn claim(_: &NoParams, _: &TraitsOf<Self>) -> Option<ClaimOf<Self>> {
+        Some(LightTransport::of_all([0]))
     }
 
     fn specialise(context: &PlanContext<'_, Self>, inputs: &InputShapes<Self>) -> Vec<Specialisation> {

@@ -30,7 +30,7 @@ pub use file::GraphFile;
 pub use gpu::{Gpu, GpuOptions};
 pub use lobelia_graph_derive::{Params, Ports};
 pub use params::{NoParams, OrNone, ParamInfo, ParamProblem, ParamValue, Params};
-pub use pass::{CreateContext, DeviceOf, InputShapes, Need, OutputShapes, Pass, PlanContext, Specialisation, TraitsOf, World};
+pub use pass::{ClaimOf, CreateContext, DeviceOf, InputShapes, Need, OutputShapes, Pass, PlanContext, Specialisation, TraitsOf, World};
 pub use pipeline::{ComputePipeline, RasterDescription, RasterPipeline};
 pub use plan::{Dropped, Plan, PlanOptions, PlannedPass, PlannedResource, Slot};
 pub use ports::{AnyShape, Arity, History, NoPorts, PortField, PortInfo, PortValue, Ports, ResourceType};

@@ -8,7 +8,7 @@ use crate::{
     run::Frame,
 };
 use lobelia_shaders::Flags;
-use std::fmt::Debug;
+use std::{fmt::Debug, ops::BitOrAssign};
 
 /// What the graph is run on: the host program's scene.
 ///
@@ -18,6 +18,9 @@ pub trait World: Sized + 'static {
     type Traits: Clone + Debug + PartialEq + 'static;
     /// The scene on the device: buffers, textures, draw lists, the camera.
     type Device: 'static;
+    /// What a pass adds to a picture, such as the light of some lamps along some paths: what the picture can fairly be compared with. The graph only joins claims
+    /// (`|=` must be a union: the order and repetition of terms change nothing; the default is the claim of nothing).
+    type Claim: Clone + Debug + Default + PartialEq + BitOrAssign + 'static;
     /// The same facts with everything that permits leaving something out taken away. A plan made with these is the unpruned one, against which
     /// savings are measured and images compared.
     fn unspecialised(traits: &Self::Traits) -> Self::Traits;
@@ -25,6 +28,8 @@ pub trait World: Sized + 'static {
 
 /// Facts of the world of pass `P`.
 pub type TraitsOf<P> = <<P as Pass>::World as World>::Traits;
+/// Claim of the world of pass `P`.
+pub type ClaimOf<P> = <<P as Pass>::World as World>::Claim;
 /// Device scene of the world of pass `P`.
 pub type DeviceOf<P> = <<P as Pass>::World as World>::Device;
 /// Input shapes of pass `P`.
@@ -119,6 +124,14 @@ pub trait Pass: Sized + 'static {
     fn need(params: &Self::Params, traits: &TraitsOf<Self>) -> Need {
         let _ = (params, traits);
         Need::Run
+    }
+
+    /// What the pass itself adds to a picture, whether it does it well or not. What it is made from is not its own: the claim of a picture is the union over all
+    /// passes behind it, [`crate::Plan::claim`]. `None`, the default, states nothing: right for passes that forward, sum, filter or display, and for those that only
+    /// prepare what others use. `params` are in range.
+    fn claim(params: &Self::Params, traits: &TraitsOf<Self>) -> Option<ClaimOf<Self>> {
+        let _ = (params, traits);
+        None
     }
 
     /// Shader flags that the scene or the inputs decide.

@@ -50,6 +50,8 @@ pub struct PlannedPass<W: World> {
     pub name: String,
     /// Shader flags with their reasons.
     pub specialisations: Vec<Specialisation>,
+    /// What it adds to a picture, if it states that.
+    pub claim: Option<W::Claim>,
     /// For each input port, the producers that are left, as indices into [`Plan::resources`].
     pub inputs: Vec<Vec<usize>>,
     /// For each output port, its resource.
@@ -60,6 +62,11 @@ impl<W: World> PlannedPass<W> {
     /// Registered name.
     pub fn kind_name(&self) -> &'static str {
         self.kind.info().name
+    }
+
+    /// Output ports.
+    pub fn output_ports(&self) -> &[PortInfo] {
+        &self.kind.info().outputs
     }
 
     /// Input ports.
@@ -167,6 +174,27 @@ impl<W: World> Plan<W> {
     /// Index of a kept resource by `pass.port` (or `pass` where that is unique); a forwarding pass answers with what it forwards.
     pub fn find(&self, name: &str) -> Option<usize> {
         self.aliases.get(name).copied()
+    }
+
+    /// Indices of the passes that a resource is made from, last frame's included, in the order in which they run.
+    pub fn behind(&self, resource: usize) -> Vec<usize> {
+        let mut found = vec![false; self.passes.len()];
+        let mut open = vec![self.resources[resource].maker];
+        while let Some(pass) = open.pop() {
+            if !std::mem::replace(&mut found[pass], true) {
+                open.extend(self.passes[pass].inputs.iter().flatten().map(|input| self.resources[*input].maker));
+            }
+        }
+        (0..found.len()).filter(|pass| found[*pass]).collect()
+    }
+
+    /// What a resource holds by the word of the passes that it is made from: the union of their claims.
+    pub fn claim(&self, resource: usize) -> W::Claim {
+        let stated = self.behind(resource).into_iter().filter_map(|pass| self.passes[pass].claim.clone());
+        stated.fold(W::Claim::default(), |mut sum, claim| {
+            sum |= claim;
+            sum
+        })
     }
 
     /// The traits that the plan was made with.
@@ -458,6 +486,7 @@ impl<W: World> Planner<'_, W> {
             params: wired.params.boxed_clone(),
             flags,
             name: wired.name.clone(),
+            claim: wired.kind.claim(wired.params.as_ref(), self.traits),
             specialisations,
             inputs,
             outputs,

@@ -145,6 +145,7 @@ pub(crate) trait Kind<W: World>: 'static {
     fn parse(&self, ron: &str) -> Result<Box<dyn AnyParams>, ron::error::SpannedError>;
     fn problems(&self, params: &dyn AnyParams) -> Vec<ParamProblem>;
     fn need(&self, params: &dyn AnyParams, traits: &W::Traits) -> Need;
+    fn claim(&self, params: &dyn AnyParams, traits: &W::Traits) -> Option<W::Claim>;
     fn specialise(&self, context: &ErasedPlanContext<'_, W>, inputs: &[PortValue]) -> Vec<Specialisation>;
     fn shape(&self, context: &ErasedPlanContext<'_, W>, inputs: &[PortValue]) -> Result<Vec<Vec<Box<dyn AnyShape>>>, PortError>;
     fn create(&self, context: &ErasedContext<'_, W>) -> Result<Box<dyn AnyPass<W>>, BuildError>;
@@ -213,6 +214,10 @@ impl<P: Pass> Kind<P::World> for Registered<P> {
 
     fn need(&self, params: &dyn AnyParams, traits: &<P::World as World>::Traits) -> Need {
         P::need(self.params(params), traits)
+    }
+
+    fn claim(&self, params: &dyn AnyParams, traits: &<P::World as World>::Traits) -> Option<<P::World as World>::Claim> {
+        P::claim(self.params(params), traits)
     }
 
     fn specialise(&self, context: &ErasedPlanContext<'_, P::World>, inputs: &[PortValue]) -> Vec<Specialisation> {

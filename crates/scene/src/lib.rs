@@ -52,6 +52,7 @@ mod ndf;
 mod nodes;
 mod tangents;
 mod traits;
+mod transport;
 mod wrapper;
 
 pub use builtin::builtin_names;
@@ -62,6 +63,7 @@ pub use material::{AlphaMode, MIN_ALPHA, Material, Sampler, Texture, TextureRef,
 pub use mesh::{Mesh, Triangle};
 pub use ndf::Ndf;
 pub use traits::{Bounds, CUBE_FACE_OUTER, SceneTraits};
+pub use transport::{LightClass, LightTransport};
 
 use glam::{DMat4, DVec3};
 use nodes::NodeTree;

@@ -69,6 +69,8 @@ pub struct SceneTraits {
     pub alpha_mask: bool,
     /// Whether any material emits.
     pub emissive: bool,
+    /// Instances whose material emits, those of area lights not counted.
+    pub emissive_surfaces: usize,
     /// Whether any material has a base-colour texture.
     pub base_color_textures: bool,
     /// Whether any material has a metallic-roughness texture.
@@ -161,6 +163,7 @@ impl SceneTraits {
             ("point lights", self.point_lights.to_string()),
             ("spot lights", self.spot_lights.to_string()),
             ("directional lights", self.directional_lights.to_string()),
+            ("emissive surfaces", self.emissive_surfaces.to_string()),
             ("quad lights", self.quad_lights.to_string()),
             ("disk lights", self.disk_lights.to_string()),
             ("sphere lights", self.sphere_lights.to_string()),
@@ -193,6 +196,7 @@ pub(crate) fn of(scene: &Scene) -> SceneTraits {
     let alphas = specular.map(|material| least_roughness(scene, material).powi(2).max(MIN_ALPHA));
     let lights = |fits: fn(&LightKind) -> bool| scene.lights.iter().filter(|light| fits(&light.kind)).count();
     let area = |fits: fn(&AreaShape) -> bool| scene.area_lights.iter().filter(|light| fits(&light.shape)).count();
+    let emits = |mesh: usize| scene.materials[scene.meshes[mesh].material].emissive.max_element() > 0.0;
     let wide = |kind: &LightKind| match kind {
         LightKind::Point => true,
         LightKind::Spot { outer, .. } => *outer > CUBE_FACE_OUTER,
@@ -209,6 +213,7 @@ pub(crate) fn of(scene: &Scene) -> SceneTraits {
         normal_maps: any(|material| material.normal_texture.is_some()),
         alpha_mask: any(|material| material.alpha_mode != AlphaMode::Opaque),
         emissive: any(|material| material.emissive.max_element() > 0.0),
+        emissive_surfaces: scene.instances.iter().filter(|instance| instance.area_light.is_none() && emits(instance.mesh)).count(),
         base_color_textures: any(|material| material.base_color_texture.is_some()),
         metallic_roughness_textures: any(|material| material.metallic_roughness_texture.is_some()),
         emissive_textures: any(|material| material.emissive_texture.is_some()),

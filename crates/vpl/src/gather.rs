@@ -1,9 +1,9 @@
 //! The `vpl-gather` pass.
 
-use lobelia_frame::{GBuffer, ImageShape, LightVisibility, Radiance, SceneWorld, VirtualLights};
+use lobelia_frame::{GBuffer, ImageShape, LightClass, LightTransport, LightVisibility, Radiance, SceneWorld, VirtualLights};
 use lobelia_graph::{
-    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OrNone, OutputShapes, Params, Pass, PlanContext,
-    PortError, Ports, RunError, Specialisation, TraitsOf, WorkRate,
+    BuildError, ClaimOf, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OrNone, OutputShapes, Params, Pass,
+    PlanContext, PortError, Ports, RunError, Specialisation, TraitsOf, WorkRate,
 };
 use lobelia_shaders::Source;
 use serde::{Deserialize, Serialize};
@@ -93,6 +93,10 @@ impl Pass for VplGatherPass {
 
     fn need(_: &VplGatherParams, traits: &TraitsOf<Self>) -> Need {
         if traits.punctual_lights() > 0 { Need::Run } else { Need::Omit("the scene has no point, spot or directional light".into()) }
+    }
+
+    fn claim(_: &VplGatherParams, _: &TraitsOf<Self>) -> Option<ClaimOf<Self>> {
+        Some(LightTransport::of(LightClass::Punctual, [2]))
     }
 
     fn specialise(context: &PlanContext<'_, Self>, inputs: &InputShapes<Self>) -> Vec<Specialisation> {

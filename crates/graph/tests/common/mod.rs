@@ -22,6 +22,8 @@ pub struct Toy;
 impl World for Toy {
     type Traits = Facts;
     type Device = ();
+    /// A bit for each thing that a toy adds.
+    type Claim = u8;
     fn unspecialised(traits: &Facts) -> Facts {
         Facts { specular: true, ..traits.clone() }
     }
