@@ -192,3 +192,38 @@ fn shape_errors_name_the_pass_and_the_place() {
     assert!(text.contains("pass `lamp` (toy-lamp): more than 32 lamps do not fit"), "{text}");
     assert!(text.starts_with("test.ron:12:"), "{text}");
 }
+
+#[test]
+fn a_picture_claims_what_the_passes_behind_it_claim() {
+    let text = |mode: &str| {
+        format!(
+            r#"(passes: {{
+                "floor": surface(), "shadow": shadow(),
+                "a": toy_lamp(count: 1), "b": toy_lamp(count: 2, mode: {mode}), "c": toy_lamp(count: 3),
+                "sum": sum(from: {{"terms": ["a.light", "b.light"]}}), "blend": blend(from: {{"light": "sum.light", "previous": "c.light"}}),
+                "aside": filter(from: {{"light": "c.light"}}), "show": show(from: {{"light": "blend.light"}}),
+            }}, output: "show")"#
+        )
+    };
+    let options =
+        PlanOptions { keep: ["sum.light", "aside.light", "floor.surface"].map(str::to_owned).to_vec(), ..PlanOptions::new([8, 4]) };
+    let claims = |mode: &str| {
+        let plan = wire(&text(mode), &[], &[]).unwrap().plan(&LIT, &options).unwrap();
+        ["a.light", "sum.light", "aside.light", "show.screen", "floor.surface"].map(|name| plan.find(name).map(|at| plan.claim(at)))
+    };
+    // What is summed joins, what last frame's was made from counts, what only filters or displays adds nothing, and what is beside the way does not count.
+    assert_eq!(claims("lit"), [Some(0b0010), Some(0b0110), Some(0b1000), Some(0b1110), Some(0)]);
+    // What this scene drops, or what is switched off, claims nothing.
+    assert_eq!(claims("absent")[1..4], [Some(0b0010), Some(0b1000), Some(0b1010)]);
+}
+
+#[test]
+fn passes_behind_a_picture_are_found_once_and_in_order() {
+    let plan = plan(BASE, &LIT).unwrap();
+    let behind = |name: &str| -> Vec<String> {
+        plan.behind(plan.find(name).unwrap()).into_iter().map(|pass| plan.passes[pass].name.clone()).collect()
+    };
+    assert_eq!(behind("show.screen"), ["floor", "shadow", "lamp", "show"]);
+    assert_eq!(behind("lamp.light"), ["floor", "shadow", "lamp"]);
+    assert_eq!(plan.passes.iter().map(|pass| pass.claim).collect::<Vec<_>>(), [None, None, None, None], "a count of 8 has no bit");
+}

@@ -137,6 +137,12 @@ pub struct ScreenOut {
     pub screen: Screen,
 }
 
+/// A lamp claims the bit of its count; nothing else claims anything.
+fn claim_of_lamp(kind: &str, params: &dyn std::any::Any) -> Option<u8> {
+    let lamp = params.downcast_ref::<LampParams>().filter(|_| kind == "toy-lamp")?;
+    1u8.checked_shl(lamp.count)
+}
+
 macro_rules! toy_pass {
     ($type:ident, $name:literal, $params:ty, $inputs:ty, $outputs:ty, need: $need:expr, shape: $shape:expr, specialise: $specialise:expr) => {
         pub struct $type;
@@ -151,6 +157,9 @@ macro_rules! toy_pass {
             fn need(params: &Self::Params, traits: &TraitsOf<Self>) -> Need {
                 let need: fn(&$params, &Facts) -> Need = $need;
                 need(params, traits)
+            }
+            fn claim(params: &Self::Params, _: &TraitsOf<Self>) -> Option<u8> {
+                claim_of_lamp(Self::NAME, params)
             }
             fn specialise(context: &PlanContext<'_, Self>, _: &InputShapes<Self>) -> Vec<Specialisation> {
                 let specialise: fn(&Facts) -> Vec<Specialisation> = $specialise;
