@@ -1,6 +1,7 @@
 //! Ground truth: a progressive path tracer on the CPU, over the same scenes, materials and conventions as the passes.
 //!
-//! What light a picture holds is chosen by [`LightPaths`]: light that scatters once, exactly twice, or up to a depth. Each vertex samples every light
+//! What light a picture holds is chosen by [`LightPaths`]: light that scatters once, exactly twice, or up to
+//! a depth, or of each class of light exactly some numbers of scattering events. Each vertex samples every light
 //! (next-event estimation) and continues by sampling the BRDF; where both can find the same light they share it by multiple importance sampling with
 //! the balance heuristic (Veach and Guibas 1995, Optimally Combining Sampling Techniques for Monte Carlo Rendering).
 //!

@@ -7,7 +7,7 @@ use lobelia_lobes::{
     luminance,
     sampling::{cone_pdf, sample_cone},
 };
-use lobelia_scene::{AreaShape, LightKind, Scene, triangulate};
+use lobelia_scene::{AreaShape, LightClass, LightKind, Scene, triangulate};
 use std::f64::consts::TAU;
 
 /// Light that arrives at a point from one direction.
@@ -170,6 +170,19 @@ impl Lights {
     /// How many samples [`Lights::samples`] takes, so how many pairs of numbers it needs.
     pub fn count(&self) -> usize {
         self.punctual.len() + self.emitters.len() + usize::from(!self.triangles.is_empty()) + usize::from(self.sky.is_some())
+    }
+
+    /// The class of light `index`.
+    pub fn class(&self, index: usize) -> LightClass {
+        let index = match index.checked_sub(self.punctual.len()) {
+            Some(index) => index,
+            None => return LightClass::Punctual,
+        };
+        match index.checked_sub(self.emitters.len()) {
+            None => LightClass::Area,
+            Some(0) if !self.triangles.is_empty() => LightClass::Emissive,
+            Some(_) => LightClass::Environment,
+        }
     }
 
     /// Whether a light's sample is chosen by numbers: lights without extent leave no choice.

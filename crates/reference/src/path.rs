@@ -8,10 +8,12 @@ use crate::{
 };
 use glam::DVec3;
 use lobelia_lobes::sampling::{brdf_pdf, sample_brdf};
-use lobelia_scene::Scene;
+use lobelia_scene::{LightClass, LightTransport, Scene};
 use std::fmt;
 
 /// Which light a picture holds.
+// A set takes 512 bytes; there is one in a render, and it is read at every vertex.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum LightPaths {
     /// Light that scatters exactly once. Lights that are seen directly are not in it.
@@ -23,24 +25,18 @@ pub enum LightPaths {
         /// Most scattering events of a path, at least 1.
         depth: u32,
     },
+    /// Of each class of light exactly this, at most 1000 scattering events. Other lights stay where they are and stop rays, but are black.
+    Only(LightTransport),
 }
 
 impl LightPaths {
-    /// Whether light that has scattered `count` times belongs to the picture.
-    fn include(self, count: u32) -> bool {
+    /// The light, by class and number of scattering events.
+    pub fn transport(&self) -> LightTransport {
         match self {
-            Self::Direct => count == 1,
-            Self::OneBounce => count == 2,
-            Self::Full { depth } => count <= depth,
-        }
-    }
-
-    /// Most scattering events.
-    fn depth(self) -> u32 {
-        match self {
-            Self::Direct => 1,
-            Self::OneBounce => 2,
-            Self::Full { depth } => depth,
+            Self::Direct => LightTransport::of_all([1]),
+            Self::OneBounce => LightTransport::of_all([2]),
+            Self::Full { depth } => LightTransport::of_all(0..=*depth),
+            Self::Only(transport) => *transport,
         }
     }
 }
@@ -51,7 +47,21 @@ impl fmt::Display for LightPaths {
             Self::Direct => formatter.write_str("direct"),
             Self::OneBounce => formatter.write_str("one-bounce"),
             Self::Full { depth } => write!(formatter, "full, up to {depth} scattering events"),
+            Self::Only(transport) => write!(formatter, "{transport}"),
         }
+    }
+}
+
+/// Light that is wanted, and how far paths must go for it.
+pub struct Wanted {
+    set: LightTransport,
+    depth: u32,
+}
+
+impl Wanted {
+    pub fn new(paths: &LightPaths) -> Self {
+        let set = paths.transport();
+        Self { set, depth: set.depth().unwrap_or(0) }
     }
 }
 
@@ -114,14 +124,14 @@ impl World {
         self.geometry.is_free(segment) || (self.cut_outs && matches!(self.meet(segment), Meeting::Nothing | Meeting::Emitter { .. }))
     }
 
-    /// Radiance that arrives along a ray, one sample of it.
-    pub fn radiance(&self, origin: DVec3, direction: DVec3, paths: LightPaths, sampler: &mut Sampler) -> DVec3 {
+    /// Radiance that arrives along a ray, one sample of it. What is left out changes no random number, so that a picture is the sum of those of its classes.
+    pub fn radiance(&self, origin: DVec3, direction: DVec3, light: &Wanted, sampler: &mut Sampler) -> DVec3 {
         let mut segment = Segment { origin, direction, reach: f64::INFINITY };
         let mut radiance = DVec3::ZERO;
         let mut throughput = DVec3::ONE;
         // Density of the direction that was followed; what the eye sees is found in no other way.
         let mut followed: Option<f64> = None;
-        for scattered in 0..=paths.depth() {
+        for scattered in 0..=light.depth {
             // Balance heuristic: what is found by following counts by its share of both densities.
             let share = |light: Option<f64>| match (followed, light) {
                 (Some(followed), Some(light)) => followed / (followed + light),
@@ -129,30 +139,30 @@ impl World {
             };
             let (surface, distance, triangle) = match self.meet(&segment) {
                 Meeting::Nothing => {
-                    if let (Some(sky), true) = (&self.lights.sky, paths.include(scattered)) {
+                    if let (Some(sky), true) = (&self.lights.sky, light.set.has(LightClass::Environment, scattered)) {
                         radiance += throughput * sky.radiance(segment.direction) * share(Some(sky.pdf(segment.direction)));
                     }
                     break;
                 }
                 Meeting::Emitter { radiance: emitted, pdf } => {
-                    if paths.include(scattered) {
+                    if light.set.has(LightClass::Area, scattered) {
                         radiance += throughput * emitted * share(Some(pdf));
                     }
                     break;
                 }
                 Meeting::Surface { surface, distance, triangle } => (surface, distance, triangle),
             };
-            if paths.include(scattered) && surface.emitted != DVec3::ZERO {
+            if light.set.has(LightClass::Emissive, scattered) && surface.emitted != DVec3::ZERO {
                 let cosine = -surface.true_normal.dot(segment.direction);
                 let pdf = self.lights.triangle_pdf(&self.geometry, triangle, cosine, distance);
                 radiance += throughput * surface.emitted * share(pdf);
             }
-            if scattered == paths.depth() {
+            if scattered == light.depth {
                 break;
             }
             let to_viewer = -segment.direction;
-            if paths.include(scattered + 1) {
-                radiance += throughput * self.light_at(&surface, to_viewer, sampler);
+            if light.set.has_any(scattered + 1) {
+                radiance += throughput * self.light_at(&surface, to_viewer, &light.set, scattered + 1, sampler);
             }
             let Some(sample) = sample_brdf(&surface.brdf, surface.normal, to_viewer, sampler.pair()) else { break };
             throughput *= if surface.normal == surface.geometric_normal {
@@ -171,11 +181,14 @@ impl World {
         radiance
     }
 
-    /// Next-event estimation: one sample of every light.
-    fn light_at(&self, surface: &Surface, to_viewer: DVec3, sampler: &mut Sampler) -> DVec3 {
+    /// Next-event estimation: one sample of every light that is wanted after `count` scattering events.
+    fn light_at(&self, surface: &Surface, to_viewer: DVec3, wanted: &LightTransport, count: u32, sampler: &mut Sampler) -> DVec3 {
         let mut sum = DVec3::ZERO;
         for light in 0..self.lights.count() {
             let u = if self.lights.is_random(light) { sampler.pair() } else { [0.0; 2] };
+            if !wanted.has(self.lights.class(light), count) {
+                continue;
+            }
             let Some(sample) = self.lights.sample(light, &self.scene, &self.geometry, &self.surfaces, surface.position, u) else {
                 continue;
             };

@@ -1,7 +1,7 @@
 //! A picture that grows: passes over all pixels, its estimated error, checkpoints.
 
 use crate::{
-    path::{LightPaths, World},
+    path::{LightPaths, Wanted, World},
     sampler::Sampler,
 };
 use glam::DVec3;
@@ -186,9 +186,13 @@ impl Render {
                 u32::MAX
             )));
         }
-        if let LightPaths::Full { depth } = settings.paths
-            && !(1..=1000).contains(&depth)
-        {
+        // Lights that are only seen directly need no scattering event, but asking for none at all is a mistake.
+        let depth = match settings.paths {
+            LightPaths::Full { depth } => depth,
+            LightPaths::Only(light) => light.depth().map_or(0, |depth| depth.max(1)),
+            LightPaths::Direct | LightPaths::OneBounce => 1,
+        };
+        if !(1..=1000).contains(&depth) {
             return Err(ReferenceError::Settings(format!("a depth of {depth}: 1 to 1000 scattering events are possible")));
         }
         let state = Checkpoint { key: key(scene, camera, &settings), passes: 0, dropped: 0, sums: vec![[0.0; 6]; pixels as usize] };
@@ -221,6 +225,7 @@ impl Render {
         let samples = self.pass_samples();
         let first = self.state.passes * samples;
         let (world, eye, settings) = (&self.world, &self.eye, &self.settings);
+        let light = Wanted::new(&settings.paths);
         let columns = settings.size[0];
         let dropped = self
             .state
@@ -235,7 +240,7 @@ impl Render {
                     let mut sampler = Sampler::new(pixel as u32, sample, settings.seed);
                     let [u, v] = sampler.pair();
                     let direction = eye.direction((f64::from(x) + u) / width, (f64::from(y) + v) / height);
-                    let radiance = world.radiance(eye.position, direction, settings.paths, &mut sampler);
+                    let radiance = world.radiance(eye.position, direction, &light, &mut sampler);
                     if radiance.is_finite() { mean += radiance } else { dropped += 1 }
                 }
                 mean /= samples as f64;
