@@ -77,6 +77,12 @@ impl<W: World> Registry<W> {
         nearest(&canonical(name), self.infos().map(|info| info.name))
     }
 
+    /// What every pass that states a claim would add to a picture of a scene, with its defaults.
+    pub fn claims(&self, traits: &W::Traits) -> Vec<(&'static str, W::Claim)> {
+        let claim = |kind: &Arc<dyn Kind<W>>| Some((kind.info().name, kind.claim(kind.parse("()").ok()?.as_ref(), traits)?));
+        self.kinds.iter().filter_map(claim).collect()
+    }
+
     pub(crate) fn find(&self, name: &str) -> Option<&Arc<dyn Kind<W>>> {
         let name = canonical(name);
         self.kinds.iter().find(|kind| kind.info().name == name)

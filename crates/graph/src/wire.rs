@@ -119,6 +119,21 @@ impl GraphFile {
         }
     }
 
+    /// Why an override fits no pass of the graph with these variants: it has no such pass, or the pass no such parameter. `None` if it fits, or if that cannot be
+    /// told because the graph has another fault.
+    pub fn lacks<W: World>(&self, registry: &Registry<W>, variants: &[String], item: &Override) -> Option<String> {
+        let mut entries = self.passes.clone();
+        for (_, replacements) in self.variants.iter().filter(|(name, _)| variants.contains(&name.text)) {
+            apply_variant(&mut entries, replacements);
+        }
+        let Some(entry) = entries.iter().find(|entry| entry.name.text == item.pass) else {
+            return Some(format!("has no pass `{}`", item.pass));
+        };
+        let info = registry.info(&entry.kind.text)?;
+        let known = info.params.iter().any(|param| param.name == item.param.replace('-', "_"));
+        (!known).then(|| format!("has a pass `{}` of kind {}, without a parameter `{}`", item.pass, info.name, item.param))
+    }
+
     /// Passes that a variant names must be in the graph, whichever variant is asked for.
     fn check_variant_names(&self) -> Vec<Problem> {
         let mut problems = Vec::new();

@@ -2,6 +2,8 @@
 
 use lobelia_frame::SceneWorld;
 use lobelia_graph::Plan;
+
+use crate::light::{Claim, uncast};
 use std::fmt::Write;
 
 /// Bytes in MiB with two decimals.
@@ -39,6 +41,14 @@ fn write_text(out: &mut String, plan: &Plan<SceneWorld>, general: Option<&Plan<S
     for dropped in &plan.dropped {
         let how = if dropped.forwards { "hands its input on" } else { "left out" };
         writeln!(out, "  {} ({}) is {how}: {}", dropped.pass, dropped.kind, dropped.reason)?;
+    }
+    let claim = Claim::of_all(plan);
+    writeln!(out, "\nlight\n  cast: {}", claim.light)?;
+    for pass in &claim.silent {
+        writeln!(out, "  not stated: {pass} makes radiance, of which lights it does not say")?;
+    }
+    for sentence in uncast(&claim, plan.traits()) {
+        writeln!(out, "  {sentence}")?;
     }
     writeln!(out, "\nmemory (MiB)")?;
     for resource in &plan.resources {

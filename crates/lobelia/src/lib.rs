@@ -37,6 +37,7 @@ pub use lobelia_vsgl as vsgl;
 pub use lobelia_vsl as vsl;
 
 pub mod explain;
+pub mod light;
 mod session;
 pub mod sweep;
 pub mod trial;
@@ -64,9 +65,4 @@ pub fn registry() -> Registry<SceneWorld> {
     lobelia_compose::register(&mut registry);
     lobelia_progressive::register(&mut registry);
     registry
-}
-
-/// Whether passes of this kind cast the light of area lights.
-pub fn casts_area_light(kind: &str) -> bool {
-    ["area-light", "area-ltc", "area-mrp", "area-monte-carlo"].contains(&kind)
 }

@@ -12,13 +12,15 @@
 //!     rounds: 3,                                          // renderings per run; the first warms up
 //!     camera: "main",                                     // left out: the first of each scene
 //!     output: "indirect.radiance",                        // left out: what the graph ends in
-//!     paths: "one-bounce",                                // direct, one-bounce or full (up to depth 2)
+//!     paths: "one-bounce",                                // direct, one-bounce or full (up to depth 2); left out: what the graphs cast
+//!     lights: "all",                                      // or classes of lights: "area,punctual"; left out: those that the graphs cast
 //!     reference_error: 0.05,                              // when the path-traced reference is good enough
 //! )
 //! ```
 
+use crate::light::Lights;
 use lobelia_graph::Override;
-use lobelia_reference::LightPaths;
+use lobelia_report::Light;
 use serde::{Deserialize, Serialize};
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -58,9 +60,12 @@ pub struct Sweep {
     /// `pass.port` that is compared; what the graph ends in if it is left out.
     #[serde(default)]
     pub output: Option<String>,
-    /// Light in the reference.
-    #[serde(default)]
-    pub paths: Paths,
+    /// Paths in the reference; what the graphs cast if it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub paths: Option<Paths>,
+    /// Classes of lights in the reference; those that the graphs cast if it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lights: Option<Lights>,
     /// Relative error at which the reference is good enough.
     #[serde(default = "reference_error")]
     pub reference_error: f64,
@@ -92,8 +97,8 @@ impl Value {
     }
 }
 
-/// Names of [`LightPaths`]: `"direct"`, `"one-bounce"`, `"full"`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+/// Names of [`lobelia_reference::LightPaths`]: `"direct"`, `"one-bounce"`, `"full"`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum Paths {
     /// Light that scatters exactly once.
@@ -101,7 +106,6 @@ pub enum Paths {
     /// Light that scatters exactly twice.
     OneBounce,
     /// Direct light, one bounce, emission and background: what a whole graph makes.
-    #[default]
     Full,
 }
 
@@ -126,16 +130,6 @@ impl From<Paths> for String {
             Paths::Full => "full",
         }
         .to_owned()
-    }
-}
-
-impl From<Paths> for LightPaths {
-    fn from(paths: Paths) -> Self {
-        match paths {
-            Paths::Direct => Self::Direct,
-            Paths::OneBounce => Self::OneBounce,
-            Paths::Full => Self::Full { depth: 2 },
-        }
     }
 }
 
@@ -261,6 +255,9 @@ pub struct Row {
     pub metrics: BTreeMap<String, f64>,
     /// Median milliseconds of each pass.
     pub passes: Vec<(String, Option<f64>)>,
+    /// Which light was compared.
+    #[serde(default)]
+    pub light: Option<Light>,
     /// Why the run failed, if it did.
     pub failed: Option<String>,
 }
@@ -285,6 +282,7 @@ impl Row {
             mebibytes: None,
             metrics: BTreeMap::new(),
             passes: Vec::new(),
+            light: None,
             failed: None,
         }
     }
@@ -374,6 +372,13 @@ impl Sweep {
                 }
             }
         }
+        cells
+    }
+
+    /// Variants and parameters that a scene is rendered with, each once: all runs of all shares, so that every share has the same reference.
+    pub fn settings(&self) -> Vec<Cell> {
+        let mut cells: Vec<Cell> = self.cells();
+        cells.retain(|cell| cell.scene == self.scenes[0] && cell.seed == self.seeds[0]);
         cells
     }
 

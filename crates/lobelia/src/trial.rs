@@ -2,7 +2,7 @@
 
 use crate::{Rendering, Session, SessionError, Shot, Step};
 use lobelia_frame::{Radiance, SceneWorld};
-use lobelia_graph::{FrameReport, Gpu, GpuOptions, PassTime, Problems, Resource, Timing, Wired};
+use lobelia_graph::{FrameReport, Gpu, GpuOptions, GraphFile, Override, PassTime, Problems, Registry, Resource, Timing, Wired};
 use lobelia_measure::{Image, timing::Summary};
 use lobelia_scene::Scene;
 
@@ -255,17 +255,120 @@ pub fn differences(a: &Measured, b: &Measured) -> Vec<Difference> {
     found
 }
 
-/// Reads and wires `FILE[:VARIANT[+VARIANT]]...` as a user writes it.
-pub fn technique(
-    text: &str,
-    overrides: &[lobelia_graph::Override],
-    registry: &lobelia_graph::Registry<SceneWorld>,
-) -> Result<Technique, Problems> {
-    let (file, variants) = split_variants(text);
-    let wired = lobelia_graph::GraphFile::load(file.as_ref())?.wire(registry, &variants, overrides)?;
-    let stem = std::path::Path::new(file).file_stem().map_or_else(|| file.to_owned(), |stem| stem.to_string_lossy().into_owned());
-    let name = if variants.is_empty() { stem } else { format!("{stem}:{}", variants.join("+")) };
-    Ok(Technique { name, wired })
+/// A technique as a user writes it: `FILE[:VARIANT[+VARIANT]...][@PASS.PARAM=VALUE[,PASS.PARAM=VALUE]...]`.
+#[derive(Clone, Debug, PartialEq)]
+struct Written {
+    file: String,
+    variants: Vec<String>,
+    settings: Vec<Override>,
+    /// The settings as they were written.
+    text: String,
+}
+
+/// Several techniques, and what is worth a warning.
+pub struct Techniques {
+    /// In the order in which they were named.
+    pub techniques: Vec<Technique>,
+    /// Overrides that do not fit some of them.
+    pub warnings: Vec<String>,
+}
+
+/// Reads and wires techniques. `overrides` are for all of them: one that fits none is an error, one that fits some is applied to those and the others are named in
+/// a warning. The settings of a technique itself come after them and must fit it.
+pub fn techniques(texts: &[String], overrides: &[Override], registry: &Registry<SceneWorld>) -> Result<Techniques, SessionError> {
+    let mut graphs = Vec::new();
+    for text in texts {
+        let written = Written::read(text).map_err(SessionError::Argument)?;
+        graphs.push((GraphFile::load(written.file.as_ref())?, written));
+    }
+    let lacks = |item: &Override| graphs.iter().map(|(graph, written)| graph.lacks(registry, &written.variants, item)).collect::<Vec<_>>();
+    let lacking: Vec<Vec<Option<String>>> = overrides.iter().map(lacks).collect();
+    // What no graph has is refused by the graph that has the nearest name.
+    for (item, lacking) in overrides.iter().zip(&lacking) {
+        if !lacking.is_empty() && lacking.iter().all(Option::is_some) {
+            let wire = |(graph, written): &(GraphFile, Written)| graph.wire(registry, &written.variants, std::slice::from_ref(item)).err();
+            let refusals: Vec<Problems> = graphs.iter().filter_map(wire).collect();
+            let suggests = |problems: &Problems| {
+                problems.problems.iter().any(|problem| problem.help.as_ref().is_some_and(|help| help.starts_with("did you mean")))
+            };
+            let nearest = refusals.iter().position(suggests).unwrap_or(0);
+            if let Some(problems) = refusals.into_iter().nth(nearest) {
+                return Err(problems.into());
+            }
+        }
+    }
+    let mut found = Techniques { techniques: Vec::new(), warnings: Vec::new() };
+    for (index, (graph, written)) in graphs.iter().enumerate() {
+        let name = written.name();
+        let mut fitting = Vec::new();
+        for (item, lacking) in overrides.iter().zip(&lacking) {
+            match &lacking[index] {
+                None => fitting.push(item.clone()),
+                Some(why) => {
+                    found.warnings.push(format!("--set {}.{}={}: {name} {why}; it stays as it is", item.pass, item.param, item.value));
+                }
+            }
+        }
+        fitting.extend(written.settings.iter().cloned());
+        found.techniques.push(Technique { name, wired: graph.wire(registry, &written.variants, &fitting)? });
+    }
+    Ok(found)
+}
+
+impl Written {
+    fn read(text: &str) -> Result<Self, String> {
+        // Whatever its name looks like, a file that is there is meant.
+        let (graph, settings) = if std::path::Path::new(text).is_file() { (text, "") } else { split_settings(text) };
+        let (file, variants) = split_variants(graph);
+        let parse = |setting: &&str| setting.parse::<Override>().map_err(|error| format!("`{text}`: {error}"));
+        let parsed = split_list(settings).iter().map(parse).collect::<Result<_, _>>()?;
+        Ok(Self { file: file.to_owned(), variants, settings: parsed, text: settings.to_owned() })
+    }
+
+    fn name(&self) -> String {
+        let stem =
+            std::path::Path::new(&self.file).file_stem().map_or_else(|| self.file.clone(), |stem| stem.to_string_lossy().into_owned());
+        let variants = if self.variants.is_empty() { String::new() } else { format!(":{}", self.variants.join("+")) };
+        let settings = if self.text.is_empty() { String::new() } else { format!("@{}", self.text) };
+        format!("{stem}{variants}{settings}")
+    }
+}
+
+/// The graph and the settings of `GRAPH@SETTINGS`. Settings begin at the first `@` that `NAME.NAME=` follows; any other belongs to the path or to a value.
+fn split_settings(text: &str) -> (&str, &str) {
+    let begins = |rest: &str| {
+        let name = rest.split_once('=').map(|(name, _)| name);
+        name.and_then(|name| name.split_once('.')).is_some_and(|(pass, param)| {
+            let plain = |name: &str| !name.is_empty() && !name.contains(['/', '\\', ':', '@', ',', '.']);
+            plain(pass) && plain(param)
+        })
+    };
+    let at = text.match_indices('@').map(|(at, _)| at).find(|at| *at > 0 && begins(&text[at + 1..]));
+    at.map_or((text, ""), |at| (&text[..at], &text[at + 1..]))
+}
+
+/// The pieces between commas that stand in no bracket and no quotes.
+fn split_list(text: &str) -> Vec<&str> {
+    let (mut pieces, mut start, mut depth, mut quoted, mut escaped) = (Vec::new(), 0, 0i32, false, false);
+    for (at, letter) in text.char_indices() {
+        match letter {
+            _ if escaped => escaped = false,
+            '\\' if quoted => escaped = true,
+            '"' => quoted = !quoted,
+            _ if quoted => {}
+            '(' | '[' | '{' => depth += 1,
+            ')' | ']' | '}' => depth -= 1,
+            ',' if depth <= 0 => {
+                pieces.push(&text[start..at]);
+                start = at + 1;
+            }
+            _ => {}
+        }
+    }
+    if !text.is_empty() {
+        pieces.push(&text[start..]);
+    }
+    pieces
 }
 
 /// The file and the variants of `FILE:VARIANT+VARIANT`. A colon within a path (as in `C:\graphs`) belongs to the path.
@@ -279,6 +382,7 @@ fn split_variants(text: &str) -> (&str, Vec<String>) {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 
@@ -288,5 +392,38 @@ mod tests {
         assert_eq!(split_variants("graphs/a.ron:b+c"), ("graphs/a.ron", vec!["b".into(), "c".into()]));
         assert_eq!(split_variants("C:\\graphs\\a.ron"), ("C:\\graphs\\a.ron", vec![]));
         assert_eq!(split_variants("C:\\a.ron:b"), ("C:\\a.ron", vec!["b".into()]));
+    }
+
+    #[test]
+    fn settings_follow_the_graph() {
+        let read = |text: &str| {
+            let written = Written::read(text).unwrap();
+            let settings: Vec<String> =
+                written.settings.iter().map(|item| format!("{}.{}={}", item.pass, item.param, item.value)).collect();
+            (written.file.clone(), written.variants.join("+"), settings.join(" "), written.name())
+        };
+        let expect = |text: &str, file: &str, variants: &str, settings: &str, name: &str| {
+            assert_eq!(read(text), (file.to_owned(), variants.to_owned(), settings.to_owned(), name.to_owned()), "{text}");
+        };
+        expect("g/a.ron:b+c@x.y=1,z.w=2", "g/a.ron", "b+c", "x.y=1 z.w=2", "a:b+c@x.y=1,z.w=2");
+        expect("g/a.ron@x.y=1.5", "g/a.ron", "", "x.y=1.5", "a@x.y=1.5");
+        // Commas, colons and more at-signs within values.
+        expect("a.ron@x.y=[1,(2,3)],z.w={\"k\":1}", "a.ron", "", "x.y=[1,(2,3)] z.w={\"k\":1}", "a@x.y=[1,(2,3)],z.w={\"k\":1}");
+        expect(r#"a.ron:v@x.y="a,b@c.d=\",",z.w=2"#, "a.ron", "v", r#"x.y="a,b@c.d=\"," z.w=2"#, r#"a:v@x.y="a,b@c.d=\",",z.w=2"#);
+        // At-signs and drives of paths.
+        expect("C:\\me@home\\a.ron:v@x.y=1", "C:\\me@home\\a.ron", "v", "x.y=1", &read("C:\\me@home\\a.ron:v@x.y=1").3);
+        expect("me@home.org/a.ron@x.y=none", "me@home.org/a.ron", "", "x.y=none", "a@x.y=none");
+        expect("a@2x.ron", "a@2x.ron", "", "", "a@2x");
+        assert!(Written::read("a.ron@x.y=1,2").unwrap_err().contains("`2` is not of the form"));
+        assert!(Written::read("a.ron@x.y=1,").unwrap_err().contains("is not of the form"));
+    }
+
+    #[test]
+    fn a_file_that_is_there_is_meant_whatever_its_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("a@b.c=d.ron");
+        std::fs::write(&file, "()").unwrap();
+        let text = file.to_str().unwrap();
+        assert_eq!(Written::read(text).unwrap().file, text);
     }
 }

@@ -92,6 +92,7 @@ fn comparison() -> Result<Comparison, image::ImageError> {
         what: what.to_owned(),
     };
     Ok(Comparison {
+        light: None,
         title: "Warm wall: 256 lobes against 64 lobes".to_owned(),
         device: "Made-up device, driver 1.2.3".to_owned(),
         scene: vec![text("triangles", "12 345"), text("lights", "2"), text("size", "640 x 360 pixels"), text("seed", "7")],
@@ -134,6 +135,7 @@ fn sweep() -> Sweep {
         }
     }
     Sweep {
+        light: Vec::new(),
         title: "Lobes against error and time".to_owned(),
         device: "Made-up device, driver 1.2.3".to_owned(),
         rows,

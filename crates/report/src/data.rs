@@ -19,6 +19,9 @@ pub struct Comparison {
     pub reference: Picture,
     /// The variants, in the order of the page.
     pub variants: Vec<Variant>,
+    /// Which light is compared.
+    #[serde(default)]
+    pub light: Option<crate::Light>,
     /// Where the passes of two variants differ, in the order of the page.
     pub differences: Vec<PassDifference>,
 }
@@ -112,6 +115,9 @@ pub struct Sweep {
     pub device: String,
     /// One row per run.
     pub rows: Vec<SweepRow>,
+    /// Which light is compared, scene by scene.
+    #[serde(default)]
+    pub light: Vec<(String, crate::Light)>,
     /// Name of the error metric, with its unit in brackets where it has one; lower is better.
     pub metric: String,
     /// Error that the reader wants to stay under, in the unit of the metric.

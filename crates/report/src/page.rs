@@ -4,6 +4,7 @@ use crate::bars::{chip, memory, times};
 use crate::data::{Comparison, PassDifference, Picture, Variant};
 use crate::direction::Direction;
 use crate::html::{data_uri, definitions, escape, fill, json, number, signed_percent, with_unit};
+use crate::light::light_box;
 use crate::verdict::{Verdict, WhereMap, fault, metric_names, metric_values, verdict};
 
 const PAGE: &str = include_str!("page.html");
@@ -44,12 +45,13 @@ fn verdict_box(comparison: &Comparison, verdict: &Verdict) -> String {
     let sentences: String = verdict.sentences.iter().map(|sentence| format!("<li>{}</li>", escape(sentence))).collect();
     let reference = img("picture-reference-picture", &comparison.reference, "Reference picture");
     let (faults, scene, command) = (faults(comparison), definitions(&comparison.scene), escape(&comparison.command));
+    let light = comparison.light.as_ref().map(|light| light_box(light, "Which light is compared")).unwrap_or_default();
     let (overlay, caption) = match &verdict.map {
         Some(map) => (overlay(map, comparison), legend(map, comparison)),
         None => (String::new(), "Reference".to_owned()),
     };
     format!(
-        "<section class=\"verdict\" aria-labelledby=\"verdict\"><div><h2 id=\"verdict\">{}</h2><ul>{sentences}</ul>{faults}<h3>Scene and command</h3>{scene}<pre><code>{command}</code></pre></div><figure><div class=\"where\">{reference}{overlay}</div><figcaption>{caption}</figcaption></figure></section>",
+        "<section class=\"verdict\" aria-labelledby=\"verdict\"><div><h2 id=\"verdict\">{}</h2><ul>{sentences}</ul>{faults}{light}<h3>Scene and command</h3>{scene}<pre><code>{command}</code></pre></div><figure><div class=\"where\">{reference}{overlay}</div><figcaption>{caption}</figcaption></figure></section>",
         escape(&verdict.headline)
     )
 }

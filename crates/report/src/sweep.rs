@@ -3,6 +3,7 @@
 use crate::choice::{Configuration, cheapest_under_error, configurations, most_accurate_under_time, overall, pareto_front, scenes};
 use crate::data::Sweep;
 use crate::html::{escape, json, number, pairs_line, with_unit};
+use crate::light::light_box;
 use crate::page::whole_page;
 use crate::plot::{Targets, plot, shape};
 
@@ -30,6 +31,9 @@ pub fn sweep_page(sweep: &Sweep) -> String {
     let failed = sweep.rows.iter().filter(|row| row.failed.is_some()).count();
     let mut body = format!("<h1>{}</h1>\n<p class=\"quiet\">{}</p>\n", escape(&sweep.title), escape(&sweep.device));
     body.push_str(&answers(sweep, &parts, failed));
+    for (scene, light) in &sweep.light {
+        body.push_str(&light_box(light, &format!("Which light is compared: {scene}")));
+    }
     body.push_str("<h2>Error against time</h2>\n<p class=\"quiet\">Both axes are logarithmic; lower left is better. Ringed points are on the Pareto front: no other is both faster and more accurate.");
     if sweep.target_error.is_some() || sweep.target_ms.is_some() {
         body.push_str(" Dashed lines are the targets.");

@@ -41,6 +41,7 @@ fn variant(name: &str, kind: u32, flip: f64, ms: f64) -> Variant {
 
 fn comparison() -> Comparison {
     Comparison {
+        light: None,
         title: "Two gathers".to_owned(),
         device: "Some device".to_owned(),
         scene: vec![("triangles".to_owned(), "12 345".to_owned())],
@@ -64,6 +65,7 @@ fn row(scene: &str, variant: &str, samples: u32, ms: f64, error: f64, failed: Op
 
 fn sweep() -> Sweep {
     Sweep {
+        light: Vec::new(),
         title: "Samples".to_owned(),
         device: "Some device".to_owned(),
         rows: vec![

@@ -9,10 +9,13 @@ use comfy_table::{CellAlignment, Table, presets};
 use indicatif::{ProgressBar, ProgressStyle};
 use lobelia::{
     Session, Shot,
+    frame::LightTransport,
     graph::{Override, Timing},
+    light::{self, Claim, Lights},
     measure::{self, Image, read_exr, timing::Ratio},
+    reference::LightPaths,
     reference::Settings,
-    report::{Comparison, PassCost, PassDifference, Picture, Variant, comparison_page},
+    report::{Comparison, Light, PassCost, PassDifference, Picture, Variant, comparison_page},
     trial::{self, Measured, Technique, TrialOptions},
     truth::{self, Goal},
 };
@@ -24,8 +27,9 @@ use std::{
 
 /// Render several techniques, measure each against the truth, and write a page about it.
 ///
-/// Every technique is a graph, or a variant of one: graphs/indirect.ron:vpl+no-visibility. They are rendered in turn, so that a machine that is busy for a while is
-/// busy for all of them. The truth is path-traced, kept in the user's cache folder and never rendered twice (LOBELIA_CACHE names another folder); --reference takes
+/// Every technique is a graph, a variant of one (graphs/indirect.ron:vpl+no-visibility), or either with settings (graphs/indirect.ron:vpl@lights.count=256,rsm.resolution=512). They are rendered in turn, so that a machine that is busy for a while is
+/// busy for all of them. The truth is path-traced and holds the light that the
+/// passes of the graphs cast, no more (--lights all asks for the rest); it is kept in the user's cache folder and never rendered twice (LOBELIA_CACHE names another folder); --reference takes
 /// a file instead. DIR gets report.html (one file, works without a network), report.json, and the pictures as EXR.
 #[derive(clap::Args, Clone, Debug)]
 #[command(
@@ -33,17 +37,18 @@ use std::{
     after_help = "\
 Examples:
   lobelia compare graphs/indirect.ron graphs/indirect.ron:no-visibility --scene builtin:cornell-glossy --report out
-  lobelia compare graphs/indirect.ron:vpl graphs/indirect.ron:interleaved --output indirect.radiance --paths one-bounce --report out
+  lobelia compare graphs/indirect.ron:vpl@lights.count=256 graphs/indirect.ron:vpl@lights.count=4096 --output indirect.radiance --report out
+  lobelia compare graphs/area-lights.ron graphs/area-lights.ron:ltc --scene builtin:area-lights --lights all --report out
   lobelia compare graphs/indirect.ron:vpl graphs/indirect.ron:interleaved --scene scenes/cornell-moving-light.ron --frames 12 --fps 12 --report out
   lobelia compare graphs/direct.ron --scene room.glb --reference truth.exr --size 640x360 --report out"
 )]
 pub struct Arguments {
-    /// Graph file, with variants after a colon: FILE[:VARIANT[+VARIANT]].
+    /// Graph file, with variants after a colon and settings after an at sign: FILE[:VARIANT[+VARIANT]][@PASS.PARAM=VALUE[,PASS.PARAM=VALUE]].
     #[arg(value_name = "GRAPH", required = true)]
     techniques: Vec<String>,
     #[command(flatten)]
     scene: SceneArguments,
-    /// Override a parameter in every graph: PASS.PARAM=VALUE.
+    /// Override a parameter in every graph that has it: PASS.PARAM=VALUE.
     #[arg(long = "set", value_name = "PASS.PARAM=VALUE")]
     overrides: Vec<Override>,
     #[command(flatten)]
@@ -66,12 +71,17 @@ pub struct TruthArguments {
     /// Picture to compare with (.exr, linear RGB) instead of a path-traced one.
     #[arg(long, value_name = "R.exr")]
     pub reference: Option<PathBuf>,
-    /// Light in the path-traced reference. What a whole graph makes is `full` up to --depth; a pass that makes direct or one-bounce light is compared with that.
-    #[arg(long, value_enum, default_value_t = Paths::Full)]
-    pub paths: Paths,
-    /// Most scattering events of the reference's paths, for --paths full. 2 is direct light and one bounce.
-    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub depth: u32,
+    /// Light in the path-traced reference instead of what the graphs cast: of these classes of lights (punctual, area, emissive, environment, separated by commas), or of
+    /// `all`. What of it a graph does not cast is said with its share.
+    #[arg(long, value_name = "all|CLASS,...")]
+    pub lights: Option<Lights>,
+    /// Paths in the reference instead of those that the graphs cast; `full` goes up to --depth.
+    #[arg(long, value_enum)]
+    pub paths: Option<Paths>,
+    /// Most scattering events of the reference's paths, for --paths full, instead of what the graphs cast. 2, direct light and one bounce, if only --lights or --paths
+    /// is given.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub depth: Option<u32>,
     /// Samples per pixel of the reference; with --reference-error, the most that are taken.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=u64::from(u32::MAX)))]
     pub reference_spp: Option<u64>,
@@ -83,12 +93,22 @@ pub struct TruthArguments {
 impl TruthArguments {
     /// What a sweep asks for.
     pub fn for_sweep(sweep: &lobelia::sweep::Sweep) -> Self {
-        let paths = match sweep.paths {
+        let paths = sweep.paths.map(|paths| match paths {
             lobelia::sweep::Paths::Direct => Paths::Direct,
             lobelia::sweep::Paths::OneBounce => Paths::OneBounce,
             lobelia::sweep::Paths::Full => Paths::Full,
-        };
-        Self { reference: None, paths, depth: 2, reference_spp: None, reference_error: Some(sweep.reference_error) }
+        });
+        let lights = sweep.lights.clone();
+        Self { reference: None, lights, paths, depth: None, reference_spp: None, reference_error: Some(sweep.reference_error) }
+    }
+
+    /// The light that is asked for; `None` where the graphs decide.
+    pub fn asked(&self) -> Option<LightPaths> {
+        if self.lights.is_none() && self.paths.is_none() && self.depth.is_none() {
+            return None;
+        }
+        let paths = self.paths.unwrap_or(Paths::Full).with_depth(self.depth.unwrap_or(light::DEPTH));
+        Some(self.lights.as_ref().map_or(paths, |lights| lights.of(paths)))
     }
 
     /// When the path-traced reference is good enough.
@@ -151,10 +171,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     arguments.sequence.check(&arguments.truth)?;
     make_folder(&arguments.report)?;
     let registry = lobelia::registry();
-    let mut techniques = Vec::new();
-    for text in &arguments.techniques {
-        techniques.push(trial::technique(text, &arguments.overrides, &registry)?);
-    }
+    let trial::Techniques { mut techniques, warnings } = trial::techniques(&arguments.techniques, &arguments.overrides, &registry)?;
     name_apart(&mut techniques);
     let scene = Session::load(&arguments.scene.scene, &arguments.scene.options())?;
     // Everything that can be wrong with the input is found before the long work.
@@ -162,11 +179,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     scene.camera(shot.camera.as_deref()).map_err(lobelia::SessionError::from)?;
     let mut options = shot.plan_options();
     options.keep.extend(arguments.shot.output.clone());
+    let mut claims = Vec::new();
     for technique in &techniques {
-        technique.wired.plan(&scene.traits(), &options)?;
+        claims.push(Claim::of_output(&technique.wired.plan(&scene.traits(), &options)?, arguments.shot.output.as_deref()));
     }
+    let paths = light::truth_paths(arguments.truth.asked(), &claims);
     if !arguments.quiet {
-        for warning in &scene.warnings {
+        for warning in warnings.iter().chain(&scene.warnings) {
             eprintln!("warning: {warning}");
         }
     }
@@ -175,7 +194,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         eprintln!("warning: nothing moves in the scene; only --new-seeds makes its frames differ");
     }
     let (known, mut expected) =
-        sequence::references(&scene, start, &shot, &arguments.sequence, &arguments.truth, &arguments.shot, arguments.quiet)?;
+        sequence::references(&scene, start, &shot, &arguments.sequence, (&arguments.truth, &paths), &arguments.shot, arguments.quiet)?;
+    let names: Vec<(&str, &Claim)> = techniques.iter().map(|technique| technique.name.as_str()).zip(&claims).collect();
+    let traced = arguments.truth.reference.is_none().then_some(&paths);
+    let light = compared_light(&scene, traced, &names, &arguments.shot)?;
     let options = TrialOptions { time: start, ..arguments.shot.trial() };
     let bar = trial_bar(arguments.quiet);
     let measured = trial::run(&scene, &techniques, &shot, &options, &mut |step| show_trial(&bar, step, &shot))?;
@@ -186,7 +208,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         expected = Expected::Own(own.into_iter().map(|one| one.frames).collect());
     }
     bar.finish_and_clear();
-    write(arguments, &scene, &known, &expected, &shot, &measured)
+    write(arguments, &scene, &known, &expected, &shot, &measured, light)
 }
 
 /// Techniques of the same name would be one row; later ones get a number.
@@ -211,7 +233,13 @@ pub fn make_folder(folder: &Path) -> Result<(), Failure> {
 }
 
 /// The reference: a file, or path-traced.
-pub fn reference(scene: &lobelia::scene::Scene, truth: &TruthArguments, shot: &ShotArguments, quiet: bool) -> Result<Known, Failure> {
+pub fn reference(
+    scene: &lobelia::scene::Scene,
+    truth: &TruthArguments,
+    paths: &LightPaths,
+    shot: &ShotArguments,
+    quiet: bool,
+) -> Result<Known, Failure> {
     if let Some(file) = &truth.reference {
         let image = read_exr(file).map_err(|error| Failure::Input(error.to_string()))?;
         let size = [image.width, image.height];
@@ -223,17 +251,49 @@ pub fn reference(scene: &lobelia::scene::Scene, truth: &TruthArguments, shot: &S
         return Ok(Known { image, variance: Vec::new(), note: format!("{}", file.display()) });
     }
     let camera = scene.camera(shot.camera.as_deref()).map_err(lobelia::SessionError::from)?;
-    let paths = truth.paths.with_depth(truth.depth);
     let goal = truth.goal();
     let bar = growth_bar(quiet, 1);
     let cache = truth::cache_folder();
-    let settings = Settings { size: shot.size, paths, samples: goal.samples, seed: REFERENCE_SEED };
+    let settings = Settings { size: shot.size, paths: *paths, samples: goal.samples, seed: REFERENCE_SEED };
     let found = truth::truth(scene, &camera, settings, goal.error, cache.as_deref(), &mut |growth| show_growth(&bar, growth))?;
     bar.finish_and_clear();
     let note =
         format!("path-traced ({paths}), {} samples per pixel, relative MSE of its own noise {:.1e}", found.samples, found.relative_noise);
     Ok(Known { image: found.image, variance: found.variance, note })
 }
+
+/// Which light is compared, and the shares of what is not. `paths` is that of the truth, `None` where it is a file. Shares are means over small pictures of few samples:
+/// a noise of some hundredths of themselves.
+pub fn compared_light(
+    scene: &lobelia::scene::Scene,
+    paths: Option<&LightPaths>,
+    techniques: &[(&str, &Claim)],
+    shot: &ShotArguments,
+) -> Result<Light, Failure> {
+    let camera = scene.camera(shot.camera.as_deref()).map_err(lobelia::SessionError::from)?;
+    let longer = shot.size[0].max(shot.size[1]);
+    let size = shot.size.map(|side| (side * SHARE_SIDE.min(longer)).div_ceil(longer).max(1));
+    let mut known: Vec<(LightTransport, f64)> = Vec::new();
+    light::compare(paths, techniques, &scene.traits(), &mut |part| {
+        if let Some((_, mean)) = known.iter().find(|(other, _)| other == part) {
+            return Ok(*mean);
+        }
+        let settings = Settings { size, paths: LightPaths::Only(*part), samples: SHARE_SAMPLES, seed: REFERENCE_SEED };
+        let mean = match part.is_nothing() {
+            true => 0.0,
+            false => measure::mean(&truth::truth(scene, &camera, settings, None, None, &mut |_| true)?.image)
+                .iter()
+                .map(|value| f64::from(*value))
+                .sum(),
+        };
+        known.push((*part, mean));
+        Ok(mean)
+    })
+}
+
+/// Longer side of the pictures that shares of light are measured on, pixels, and their samples per pixel.
+const SHARE_SIDE: u32 = 96;
+const SHARE_SAMPLES: u64 = 64;
 
 /// The techniques' seed must not choose another reference.
 const REFERENCE_SEED: u32 = 1;
@@ -308,6 +368,7 @@ fn write(
     expected: &Expected,
     shot: &Shot,
     measured: &[Measured],
+    light: Light,
 ) -> Result<(), Failure> {
     let folder = &arguments.report;
     files::write_exr(&folder.join("reference.exr"), &known.image)?;
@@ -338,6 +399,7 @@ fn write(
             .collect(),
         command: std::iter::once("lobelia".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" "),
         reference: displayed(&known.image, &known.image)?,
+        light: Some(light),
         differences: differences.collect(),
         variants,
     };
@@ -359,7 +421,7 @@ pub fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
 
 /// A name without what file systems dislike.
 fn file_name(name: &str) -> String {
-    name.chars().map(|letter| if letter.is_ascii_alphanumeric() || "-_+.".contains(letter) { letter } else { '_' }).collect()
+    name.chars().map(|letter| if letter.is_ascii_alphanumeric() || "-_+.@=,".contains(letter) { letter } else { '_' }).collect()
 }
 
 fn variant(one: &Measured, first: &Measured, known: &Known) -> Result<Variant, Failure> {
@@ -454,6 +516,9 @@ fn print_table(comparison: &Comparison, measured: &[Measured], known: &Known) ->
     let mut out = std::io::stdout().lock();
     writeln!(out, "{table}")?;
     writeln!(out, "device: {}; reference: {}", comparison.device, known.note)?;
+    for sentence in comparison.light.iter().flat_map(Light::sentences) {
+        writeln!(out, "light: {sentence}")?;
+    }
     if let Some((_, sequence)) = comparison.scene.iter().find(|(name, _)| name == "sequence") {
         writeln!(out, "sequence: {sequence}")?;
     }

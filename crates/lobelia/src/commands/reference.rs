@@ -6,6 +6,7 @@ use crate::{
 use indicatif::{ProgressBar, ProgressStyle};
 use lobelia::{
     Session,
+    light::Lights,
     measure::Image,
     reference::{LightPaths, Picture, ReferenceError, Render, Settings},
     truth::{self, Goal, Growth, Keep},
@@ -28,6 +29,7 @@ use std::{
 Examples:
   lobelia reference --scene builtin:cornell-glossy --paths one-bounce --spp 256 -o truth.exr
   lobelia reference --scene room.glb --camera sofa --size 1280x720 --paths full --error 0.02 -o room.exr
+  lobelia reference --scene room.glb --paths direct --lights area,environment --error 0.05 -o sky.exr
   lobelia reference --scene room.glb --paths direct --spp 64 --threads 4 --seed 7 -o direct.exr"
 )]
 pub struct Arguments {
@@ -39,6 +41,9 @@ pub struct Arguments {
     /// Most scattering events of a path, for --paths full.
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=1000))]
     depth: u32,
+    /// Only the light of these classes, separated by commas: punctual, area, emissive, environment. The other lights stay where they are, and are black.
+    #[arg(long, value_name = "CLASS,...", default_value = "all")]
+    lights: Lights,
     /// Samples per pixel; rounded up to a multiple of 16 above 16. With --error, the most that are taken.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=u64::from(u32::MAX)))]
     spp: Option<u64>,
@@ -125,7 +130,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let camera = scene.camera(arguments.camera.as_deref()).map_err(lobelia::SessionError::from)?;
     let goal = Goal::new(arguments.spp, arguments.error);
-    let paths = arguments.paths.with_depth(arguments.depth);
+    let paths = arguments.lights.of(arguments.paths.with_depth(arguments.depth));
     let settings = Settings { size: arguments.size, paths, samples: goal.samples, seed: arguments.seed };
     let mut render = Render::new(&scene, &camera, settings)?;
     let checkpoint = arguments.output.with_extension("checkpoint");

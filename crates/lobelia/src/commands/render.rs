@@ -103,7 +103,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     scene.camera(shot.camera.as_deref()).map_err(lobelia::SessionError::from)?;
     let plan = wired.plan(&scene.traits(), &shot.plan_options())?;
     check_kinds(arguments, &plan)?;
-    warn_unlit(arguments, &plan, &scene.traits());
+    warn_uncast(arguments, &plan, &scene.traits());
     drop(plan);
 
     let gpu = lobelia::graph::Gpu::new(&lobelia::graph::GpuOptions { adapter: arguments.adapter.clone(), baseline: arguments.baseline })?;
@@ -184,16 +184,13 @@ fn check_kinds(arguments: &Arguments, plan: &Plan<SceneWorld>) -> Result<(), Fai
     Ok(())
 }
 
-/// Lights that no pass of the graph uses would leave a dark picture unexplained.
-fn warn_unlit(arguments: &Arguments, plan: &Plan<SceneWorld>, traits: &lobelia::scene::SceneTraits) {
-    let cast = plan.passes.iter().any(|pass| lobelia::casts_area_light(pass.kind_name()));
-    let area = if cast { return } else { traits.area_lights() };
-    if area > 0 && traits.punctual_lights() == 0 && !arguments.quiet {
-        eprintln!(
-            "warning: the scene is lit by {area} area light(s) only, and no pass of this graph casts their light; they are drawn, but light nothing"
-        );
-    } else if area == 0 && traits.punctual_lights() == 0 && !arguments.quiet {
-        eprintln!("warning: the scene has no light that a pass of this graph casts; only emission and background are seen");
+/// Lights that no pass of the graph casts: a picture would be dark, or darker than its scene, without a word.
+fn warn_uncast(arguments: &Arguments, plan: &Plan<SceneWorld>, traits: &lobelia::scene::SceneTraits) {
+    if arguments.quiet {
+        return;
+    }
+    for sentence in lobelia::light::uncast(&lobelia::light::Claim::of_all(plan), traits) {
+        eprintln!("warning: {sentence}");
     }
 }
 

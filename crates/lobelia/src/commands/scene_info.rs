@@ -23,6 +23,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let options = SessionOptions { ndf: arguments.ndf, time: arguments.time, ..SessionOptions::default() };
     let scene = Session::load(&arguments.scene, &options)?;
     let traits = scene.traits();
+    let casters = lobelia::light::casters(&lobelia::registry(), &traits);
     let mut out = std::io::stdout().lock();
     if arguments.json {
         let lights: Vec<_> = scene
@@ -39,8 +40,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             })
             .collect();
         let cameras: Vec<_> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
+        let cast_by: std::collections::BTreeMap<_, _> = casters.iter().map(|(class, passes)| (class.name(), passes)).collect();
         let value = serde_json::json!({
-            "name": scene.name, "traits": traits, "lights": lights, "cameras": cameras, "warnings": scene.warnings,
+            "cast_by": cast_by, "name": scene.name, "traits": traits, "lights": lights, "cameras": cameras, "warnings": scene.warnings,
         });
         writeln!(out, "{value:#}")?;
         return Ok(());
@@ -56,6 +58,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     for light in &scene.area_lights {
         writeln!(out, "  area light {:<17} {:?}, radiance {}", light.name, light.shape, light.radiance)?;
+    }
+    for (class, passes) in &casters {
+        let lights = lobelia::light::counted(*class, traits.lights_of(*class));
+        if passes.is_empty() {
+            writeln!(out, "  warning: no built-in pass casts the light of {lights}")?;
+        } else {
+            writeln!(out, "  {:<28} {}", format!("{lights} cast by"), passes.join(", "))?;
+        }
     }
     for warning in &scene.warnings {
         writeln!(out, "  warning: {warning}")?;

@@ -5,6 +5,7 @@ use crate::failure::Failure;
 use lobelia::{
     Shot, frame_time,
     measure::{self, Image},
+    reference::LightPaths,
     scene::Scene,
     trial::Measured,
 };
@@ -93,7 +94,7 @@ pub fn references(
     start: f32,
     shot: &Shot,
     sequence: &SequenceArguments,
-    truth: &TruthArguments,
+    (truth, paths): (&TruthArguments, &LightPaths),
     arguments: &ShotArguments,
     quiet: bool,
 ) -> Result<(Known, Expected), Failure> {
@@ -102,7 +103,7 @@ pub fn references(
         if sequence.is_sequence() {
             scene.set_time(frame_time(start, shot, frame));
         }
-        reference(&scene, truth, arguments, quiet)
+        reference(&scene, truth, paths, arguments, quiet)
     };
     if !sequence.is_sequence() || sequence.against() == FlickerAgainst::Own {
         return Ok((at(shot.frames - 1)?, Expected::Nothing));

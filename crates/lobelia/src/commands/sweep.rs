@@ -1,17 +1,18 @@
-use super::compare::{ShotArguments, TruthArguments, make_folder, metrics, reference, trial_bar, write_text};
+use super::compare::{Known, ShotArguments, TruthArguments, compared_light, make_folder, metrics, reference, trial_bar, write_text};
 use crate::failure::Failure;
 use comfy_table::{CellAlignment, Table, presets};
 use indicatif::ProgressBar;
 use lobelia::{
     Session, SessionOptions,
     graph::GraphFile,
-    measure::Image,
-    report::{self, SweepRow, cheapest_under_error, most_accurate_under_time, sweep_page},
+    light::{self, Claim},
+    reference::LightPaths,
+    report::{self, Light, SweepRow, cheapest_under_error, most_accurate_under_time, sweep_page},
+    scene::Scene,
     sweep::{Cell, Row, Shard, Store, Sweep, SweepError, merge},
     trial::{self, Technique},
 };
 use std::{
-    collections::HashMap,
     io::Write,
     path::{Path, PathBuf},
 };
@@ -123,9 +124,79 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     conclude(arguments, store.rows())
 }
 
-/// References of scenes that were needed so far. Scenes come one after another, so one is kept.
+/// The reference of one scene. Scenes come one after another, so one is kept.
 #[derive(Default)]
-struct References(HashMap<String, Image>);
+struct References(Option<SceneTruth>);
+
+/// The truth of a scene, and what was said of the light of its techniques.
+struct SceneTruth {
+    scene: String,
+    known: Known,
+    paths: LightPaths,
+    lights: Vec<(String, Claim, Light)>,
+}
+
+impl References {
+    /// The truth of the scene of a run: its light is what all settings of the sweep cast together, whichever share they are in.
+    fn of(&mut self, sweep: &Sweep, address: &str, scene: &Scene, shot: &ShotArguments) -> Result<&mut SceneTruth, Failure> {
+        let kept = self.0.take().filter(|truth| truth.scene == address);
+        let truth = match kept {
+            Some(truth) => truth,
+            None => {
+                let graph = GraphFile::load(Path::new(&sweep.graph))?;
+                let mut options = shot.shot().plan_options();
+                options.keep.extend(sweep.output.clone());
+                // A setting that cannot be planned fails in its own row.
+                let claim = |cell: &Cell| {
+                    let wired = graph.wire(&lobelia::registry(), &cell.variants(), &cell.overrides()).ok()?;
+                    let plan = wired.plan(&scene.traits(), &options).ok()?;
+                    Some(Claim::of_output(&plan, sweep.output.as_deref()))
+                };
+                let claims: Vec<Claim> = sweep.settings().iter().filter_map(claim).collect();
+                let truth = TruthArguments::for_sweep(sweep);
+                let paths = light::truth_paths(truth.asked(), &claims);
+                let known = reference(scene, &truth, &paths, shot, true)?;
+                SceneTruth { scene: address.to_owned(), known, paths, lights: Vec::new() }
+            }
+        };
+        Ok(self.0.insert(truth))
+    }
+}
+
+impl SceneTruth {
+    fn light(&mut self, scene: &Scene, name: &str, claim: Claim, shot: &ShotArguments) -> Result<Light, Failure> {
+        if let Some((_, _, light)) = self.lights.iter().find(|(other, known, _)| other == name && *known == claim) {
+            return Ok(light.clone());
+        }
+        let light = compared_light(scene, Some(&self.paths), &[(name, &claim)], shot)?;
+        self.lights.push((name.to_owned(), claim, light.clone()));
+        Ok(light)
+    }
+}
+
+/// The light of several runs of one scene, taken together.
+fn joined(lights: &[&Light]) -> Light {
+    let mut all = Light::default();
+    for light in lights {
+        all.held = all.held.or_else(|| light.held.clone());
+        let new = |one: &&report::TechniqueLight| !all.techniques.contains(one);
+        let techniques: Vec<_> = light.techniques.iter().filter(new).cloned().collect();
+        all.techniques.extend(techniques);
+        for (from, to) in [(&light.missing, &mut all.missing), (&light.extra, &mut all.extra)] {
+            for one in from {
+                if !to.iter().any(|other| other.technique == one.technique && other.what == one.what) {
+                    to.push(one.clone());
+                }
+            }
+        }
+    }
+    // Only what all of them leave out is left out.
+    if let Some((first, rest)) = lights.split_first() {
+        let by_all = |part: &&report::LeftOut| rest.iter().all(|light| light.left_out.iter().any(|other| other.what == part.what));
+        all.left_out = first.left_out.iter().filter(by_all).cloned().collect();
+    }
+    all
+}
 
 /// A run; whatever goes wrong in it is its row.
 fn run_cell(arguments: &Arguments, sweep: &Sweep, cell: &Cell, references: &mut References, bar: &ProgressBar) -> Row {
@@ -155,13 +226,9 @@ fn fill(arguments: &Arguments, sweep: &Sweep, cell: &Cell, references: &mut Refe
     // What is wrong with the graph on this scene is found before the reference is traced.
     let mut options = shot.plan_options();
     options.keep.extend(sweep.output.clone());
-    wired.plan(&scene.traits(), &options)?;
-    if !references.0.contains_key(&cell.scene) {
-        let truth = TruthArguments::for_sweep(sweep);
-        let known = reference(&scene, &truth, &shot_arguments, true)?;
-        references.0.clear();
-        references.0.insert(cell.scene.clone(), known.image);
-    }
+    let claim = Claim::of_output(&wired.plan(&scene.traits(), &options)?, sweep.output.as_deref());
+    let truth = references.of(sweep, &cell.scene, &scene, &shot_arguments)?;
+    row.light = Some(truth.light(&scene, variant_name(&cell.variant), claim, &shot_arguments)?);
     let technique = Technique { name: cell.variant.clone(), wired };
     let measured = trial::run(&scene, &[technique], &shot, &shot_arguments.trial(), &mut |_| true)?;
     let [one] = measured.as_slice() else { return Ok(()) };
@@ -169,10 +236,13 @@ fn fill(arguments: &Arguments, sweep: &Sweep, cell: &Cell, references: &mut Refe
     row.ms = one.frame_ms.map(|summary| summary.median);
     row.mebibytes = Some(one.bytes as f64 / (1u64 << 20) as f64);
     row.passes = one.passes.iter().map(|pass| (pass.name.clone(), pass.gpu_ms.map(|summary| summary.median))).collect();
-    if let Some(image) = references.0.get(&cell.scene) {
-        row.metrics = metrics(&one.image, image)?;
-    }
+    row.metrics = metrics(&one.image, &truth.known.image)?;
     Ok(())
+}
+
+/// Variants for people.
+fn variant_name(variant: &str) -> &str {
+    if variant.is_empty() { "the graph as it is" } else { variant }
 }
 
 /// The page, and what it answers.
@@ -185,7 +255,7 @@ fn conclude(arguments: &Arguments, rows: &[Row]) -> Result<(), Failure> {
     }
     let shown = |row: &Row| SweepRow {
         scene: row.scene.clone(),
-        variant: if row.variant.is_empty() { "the graph as it is".to_owned() } else { row.variant.clone() },
+        variant: variant_name(&row.variant).to_owned(),
         parameters: row.parameters.clone(),
         seed: row.seed.into(),
         ms: row.ms.unwrap_or(f64::NAN),
@@ -193,10 +263,20 @@ fn conclude(arguments: &Arguments, rows: &[Row]) -> Result<(), Failure> {
         failed: row.failed.clone(),
     };
     let devices: std::collections::BTreeSet<&str> = rows.iter().map(|row| row.device.as_str()).filter(|name| !name.is_empty()).collect();
+    let mut light: Vec<(String, Light)> = Vec::new();
+    for row in rows {
+        if !light.iter().any(|(scene, _)| *scene == row.scene) {
+            let of_scene: Vec<&Light> = rows.iter().filter(|other| other.scene == row.scene).filter_map(|row| row.light.as_ref()).collect();
+            if !of_scene.is_empty() {
+                light.push((row.scene.clone(), joined(&of_scene)));
+            }
+        }
+    }
     let sweep = report::Sweep {
         title: format!("{} runs", rows.len()),
         device: devices.into_iter().collect::<Vec<_>>().join(", "),
         rows: rows.iter().map(shown).collect(),
+        light,
         metric: arguments.metric.clone(),
         target_error: arguments.target_error,
         target_ms: arguments.target_ms,
@@ -237,6 +317,11 @@ fn conclude(arguments: &Arguments, rows: &[Row]) -> Result<(), Failure> {
         let found = most_accurate_under_time(&points, ms);
         let text = found.map_or_else(|| "none".to_owned(), |index| format!("{}, {:.3e}", name(index), points[index].1));
         writeln!(out, "most accurate within {ms} ms: {text}")?;
+    }
+    for (scene, light) in &sweep.light {
+        for sentence in light.sentences() {
+            writeln!(out, "{scene}: {sentence}")?;
+        }
     }
     let failed = rows.iter().filter(|row| row.failed.is_some()).count();
     if failed > 0 {
