@@ -4,7 +4,7 @@
 #import lobelia::light::light_sample
 #import lobelia::math::{safe_normalize, storable}
 #import lobelia::octahedral::octahedral_unpack
-#import lobelia::reflective_shadow_map::{RsmFace, rsm_cube_face, rsm_direction_to_light, rsm_distance, rsm_project, rsm_ray, rsm_ray_origin}
+#import lobelia::reflective_shadow_map::{RsmFace, rsm_cube_face, rsm_direction_to_light, rsm_distance, rsm_project, rsm_ray, rsm_ray_origin, rsm_texel}
 #import lobelia::scene::{PunctualLight, View, scene_position}
 #import lobelia::surface::{PackedSurface, unpack_surface}
 
@@ -46,11 +46,12 @@ const MAX_FACTOR: f32 = 1e18;
 // Slopes, in texels of depth per texel, beyond which neither a texel's plane nor a receiver is believed.
 const MAX_SLOPE: f32 = 16.0;
 
-fn caster_normal(texel: vec2u, layer: u32) -> vec3f {
+fn caster_normal(face: RsmFace, texel: vec2u) -> vec3f {
+    let place = rsm_texel(face, texel);
 #ifdef NORMAL_MAP
-    return octahedral_unpack(textureLoad(rsm_normal, texel, layer, 0).x);
+    return octahedral_unpack(textureLoad(rsm_normal, place, face.layer, 0).x);
 #else
-    return octahedral_unpack(textureLoad(rsm_core, texel, layer, 0).x);
+    return octahedral_unpack(textureLoad(rsm_core, place, face.layer, 0).x);
 #endif
 }
 
@@ -71,18 +72,18 @@ struct Receiver {
 }
 
 // Whether the surface in one texel stands between the light and the receiver.
-fn shades(face: RsmFace, layer: u32, texel: vec2u, depth: f32, receiver: Receiver) -> bool {
+fn shades(face: RsmFace, texel: vec2u, depth: f32, receiver: Receiver) -> bool {
     let caster = rsm_distance(face, depth);
 #ifdef DEPTH_COMPARISON
     return caster < receiver.distance - receiver.slack;
 #else
     // Past a convex edge the receiver is met below the other side's plane, but no caster stands behind the receiver's own plane.
-    let texel_uv = (vec2f(texel) + vec2f(0.5)) / f32(textureDimensions(rsm_depth).x);
+    let texel_uv = (vec2f(texel) + vec2f(0.5)) / f32(face.resolution);
     let seen = rsm_ray_origin(face, texel_uv) + rsm_ray(face, texel_uv) * caster;
     if dot(seen - receiver.position, receiver.normal) <= receiver.rounding {
         return false;
     }
-    let normal = caster_normal(texel, layer);
+    let normal = caster_normal(face, texel);
     let descent = dot(rsm_ray(face, receiver.uv), normal);
     let rise = dot(seen - rsm_ray_origin(face, receiver.uv), normal);
     // A plane seen edge-on says nothing about its neighbourhood.
@@ -93,19 +94,32 @@ fn shades(face: RsmFace, layer: u32, texel: vec2u, depth: f32, receiver: Receive
 
 // Share of the filter's texels past which the light is seen.
 fn shadow(first: RsmFace, position: vec3f, geometric_normal: vec3f) -> f32 {
-    var layer = first.first_face;
-    if first.face_count == 6u {
-        layer += rsm_cube_face(position - first.position);
+    let orthographic = first.depth_range != 0.0;
+    var index = first.first_face;
+    if orthographic {
+        // The finest that holds the filter too; the last holds everything.
+        let last = first.first_face + first.face_count - 1u;
+        let inset = vec2f(0.5 * f32(settings.filter_width) + 0.5) / f32(first.resolution);
+        while index < last {
+            let uv = rsm_project(faces[index], position).xy;
+            if all(uv >= inset) && all(uv <= vec2f(1.0) - inset) {
+                break;
+            }
+            index += 1u;
+        }
+    } else if first.face_count == 6u {
+        index += rsm_cube_face(position - first.position);
     }
-    let face = faces[layer];
-    let resolution = f32(textureDimensions(rsm_depth).x);
+    let face = faces[index];
+    let resolution = f32(face.resolution);
     let projected = rsm_project(face, position);
-    if projected.z <= 0.0 || any(projected.xy < vec2f(0.0)) || any(projected.xy > vec2f(1.0)) {
+    if projected.z <= select(0.0, face.near, orthographic) || any(projected.xy < vec2f(0.0)) || any(projected.xy > vec2f(1.0)) {
         return 1.0;
     }
     let width_at_one = 2.0 * length(face.right) / resolution;
-    let footprint = select(width_at_one * projected.z, width_at_one, face.depth_range != 0.0);
-    let rounding = projected.z * 2.44140625e-4;
+    let footprint = select(width_at_one * projected.z, width_at_one, orthographic);
+    let depth_scale = select(projected.z, max(projected.z, 0.5 * length(face.right)), orthographic);
+    let rounding = max(depth_scale * 2.44140625e-4, face.rounding);
     var slack = settings.bias * footprint + rounding;
 #ifdef DEPTH_COMPARISON
     // Over one texel the receiver's own depth changes by the tangent of its slope.
@@ -124,8 +138,8 @@ fn shadow(first: RsmFace, position: vec3f, geometric_normal: vec3f) -> f32 {
         for (var x = 0; x <= width; x++) {
             let weight_x = select(select(1.0, 1.0 - fraction.x, x == 0), fraction.x, x == width);
             let texel = vec2u(clamp(base + vec2i(x, y), vec2i(0), vec2i(last)));
-            let depth = textureLoad(rsm_depth, texel, layer, 0);
-            if depth <= 0.0 || !shades(face, layer, texel, depth, receiver) {
+            let depth = textureLoad(rsm_depth, rsm_texel(face, texel), face.layer, 0);
+            if depth <= 0.0 || !shades(face, texel, depth, receiver) {
                 lit += weight_x * weight_y;
             }
         }

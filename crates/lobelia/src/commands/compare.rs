@@ -162,11 +162,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     scene.camera(shot.camera.as_deref()).map_err(lobelia::SessionError::from)?;
     let mut options = shot.plan_options();
     options.keep.extend(arguments.shot.output.clone());
+    let mut warnings = Vec::new();
     for technique in &techniques {
-        technique.wired.plan(&scene.traits(), &options)?;
+        let plan = technique.wired.plan(&scene.traits(), &options)?;
+        warnings.extend(plan.warnings().filter(|_| !arguments.quiet).map(|warning| format!("{}: {warning}", technique.name)));
     }
     if !arguments.quiet {
-        for warning in &scene.warnings {
+        for warning in scene.warnings.iter().chain(&warnings) {
             eprintln!("warning: {warning}");
         }
     }
