@@ -20,6 +20,22 @@ struct RsmFace {
     up: vec3f,
     first_face: u32,
     face_count: u32,
+    // Texels a side.
+    resolution: u32,
+    // Layer of the map's textures, and the first texel there.
+    layer: u32,
+    // How likely a virtual light is placed here for the flux that is reflected, among the faces of one light.
+    weight: f32,
+    // Texture coordinates of what a finer face of the same light covers: least x, y, greatest x, y. Empty: greatest below least.
+    hole: vec4f,
+    corner: vec2u,
+    // What rounding makes of positions in a scene of this size, metres.
+    rounding: f32,
+}
+
+// Where a texel of a face lies in its layer.
+fn rsm_texel(face: RsmFace, texel: vec2u) -> vec2u {
+    return face.corner + texel;
 }
 
 // Where a point lies in a face: texture coordinates, and distance along `forward` in metres.
@@ -89,8 +105,11 @@ fn rsm_lifted_position(face: RsmFace, uv: vec2f, depth: f32, normal: vec3f, reso
 }
 
 // Flux through the texel at `uv` of a map of `resolution` texels a side, W per channel: intensity times solid angle (cos^3 over the area on the plane at
-// distance 1), or irradiance times area.
+// distance 1), or irradiance times area. Where a finer face covers the texel its flux is counted there, and 0 here.
 fn rsm_flux(face: RsmFace, light: PunctualLight, uv: vec2f, resolution: f32) -> vec3f {
+    if all(uv > face.hole.xy) && all(uv < face.hole.zw) {
+        return vec3f(0.0);
+    }
     let area = 4.0 * length(face.right) * length(face.up) / (resolution * resolution);
     if light.kind == LIGHT_DIRECTIONAL {
         return light.intensity * area;

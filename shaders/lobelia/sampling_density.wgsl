@@ -27,12 +27,48 @@ fn reflected_flux(surface: Surface, flux: vec3f, to_light: vec3f) -> f32 {
     return luminance(flux * albedo);
 }
 
+// Texels a side of the finest level of a face, for a map of `resolution` >= 2 texels a side.
+fn density_side(resolution: u32) -> u32 {
+    return 1u << (32u - countLeadingZeros(resolution - 1u));
+}
+
+// Faces along each side of a layer.
+fn density_tiles(weights: texture_2d_array<f32>) -> i32 {
+    return i32(textureDimensions(weights, 0).x >> (textureNumLevels(weights) - 1u));
+}
+
+// Places for faces; those behind the last face have no weight.
+fn density_faces(weights: texture_2d_array<f32>) -> i32 {
+    let tiles = density_tiles(weights);
+    return i32(textureNumLayers(weights)) * tiles * tiles;
+}
+
+// A texel of a level, by its place in its face.
+fn density_weight(weights: texture_2d_array<f32>, texel: vec2i, face: i32, level: i32) -> f32 {
+    let tiles = density_tiles(weights);
+    let in_layer = face % (tiles * tiles);
+    let side = 1 << (textureNumLevels(weights) - 1u - u32(level));
+    return textureLoad(weights, vec2i(in_layer % tiles, in_layer / tiles) * side + texel, face / (tiles * tiles), level).x;
+}
+
+// The face and the texel in it of a texel of the finest level of a layer. `side`: see `density_side`.
+struct DensityPlace {
+    face: u32,
+    texel: vec2u,
+}
+
+fn density_place(texel: vec2u, layer: u32, layer_side: u32, side: u32) -> DensityPlace {
+    let tiles = layer_side / side;
+    let tile = texel / side;
+    return DensityPlace((layer * tiles + tile.y) * tiles + tile.x, texel % side);
+}
+
 // Sum of all weights.
 fn sampling_density_total(weights: texture_2d_array<f32>) -> f32 {
     let top = i32(textureNumLevels(weights)) - 1;
     var total = 0.0;
-    for (var face = 0; face < i32(textureNumLayers(weights)); face++) {
-        total += textureLoad(weights, vec2i(0), face, top).x;
+    for (var face = 0; face < density_faces(weights); face++) {
+        total += density_weight(weights, vec2i(0), face, top);
     }
     return total;
 }
@@ -52,17 +88,17 @@ struct DescendedTexel {
     weight: f32,
 }
 
-// The texel below texel `start` of level `top` that the unit square's point `point` falls on, in proportion to weights. `start` must have a weight.
+// The texel of a face below texel `start` of level `top` that the unit square's point `point` falls on, in proportion to weights. `start` must have a weight.
 fn descend_density(weights: texture_2d_array<f32>, start: vec2i, face: i32, top: i32, point: vec2f) -> DescendedTexel {
     var u = point;
     var texel = start;
-    var weight = textureLoad(weights, start, face, top).x;
+    var weight = density_weight(weights, start, face, top);
     for (var level = top - 1; level >= 0; level--) {
         texel *= 2;
-        let a = textureLoad(weights, texel, face, level).x;
-        let b = textureLoad(weights, texel + vec2i(1, 0), face, level).x;
-        let c = textureLoad(weights, texel + vec2i(0, 1), face, level).x;
-        let d = textureLoad(weights, texel + vec2i(1, 1), face, level).x;
+        let a = density_weight(weights, texel, face, level);
+        let b = density_weight(weights, texel + vec2i(1, 0), face, level);
+        let c = density_weight(weights, texel + vec2i(0, 1), face, level);
+        let d = density_weight(weights, texel + vec2i(1, 1), face, level);
         let across = split_unit(u.x, a + c, b + d);
         let right = across.x > 0.5;
         let upper = select(a, b, right);
@@ -82,17 +118,17 @@ fn sample_density(weights: texture_2d_array<f32>, point: vec2f) -> SampledTexel 
         return SampledTexel(vec2u(0u), 0u, 0.0);
     }
     let top = i32(textureNumLevels(weights)) - 1;
-    let faces = i32(textureNumLayers(weights));
+    let faces = density_faces(weights);
     var u = point;
     var face = 0;
-    var weight = textureLoad(weights, vec2i(0), 0, top).x;
+    var weight = density_weight(weights, vec2i(0), 0, top);
     if faces > 1 {
         let place = u.x * total;
         var before = 0.0;
         while face < faces - 1 && (weight <= 0.0 || place >= before + weight) {
             before += weight;
             face++;
-            weight = textureLoad(weights, vec2i(0), face, top).x;
+            weight = density_weight(weights, vec2i(0), face, top);
         }
         u.x = clamp((place - before) / max(weight, 1e-38), 0.0, 0.99999994);
     }

@@ -4,9 +4,9 @@
 #import lobelia::brdf::{Brdf, albedo_estimate, brdf_from_surface, evaluate_brdf, fresnel, phong_exponent}
 #import lobelia::math::{PI, luminance, safe_normalize, square}
 #import lobelia::microfacet_lobe::{filtered_ndf_shading, ggx_lobe_one, glossy_sg_light_two, lobe_shading, phong_lobe, reflection_lobe_sg}
-#import lobelia::reflective_shadow_map::{RsmFace, rsm_direction_to_light, rsm_flux, rsm_footprint, rsm_lifted_position, rsm_position, rsm_texel_uv}
+#import lobelia::reflective_shadow_map::{RsmFace, rsm_direction_to_light, rsm_flux, rsm_footprint, rsm_lifted_position, rsm_position, rsm_texel, rsm_texel_uv}
 #import lobelia::sampling::{hash, r2_point}
-#import lobelia::sampling_density::{descend_density, reflected_flux, sample_density, sampling_density_total, storable_weight}
+#import lobelia::sampling_density::{density_place, density_side, density_weight, descend_density, reflected_flux, sample_density, sampling_density_total, storable_weight}
 #import lobelia::scene::{PunctualLight, View, scene_position}
 #import lobelia::sg::sg_integral
 #import lobelia::sg_cosine::clamped_cosine_integral
@@ -72,7 +72,7 @@ struct Emitter {
     // Of the disk that it stands for.
     radius: f32,
     flux: vec3f,
-    // Reflected flux; 0: nothing is there.
+    // Reflected flux times the weight of its face; 0: nothing is there.
     reflected: f32,
     normal: vec3f,
     geometric_normal: vec3f,
@@ -97,31 +97,35 @@ var<workgroup> emitters: array<Emitter, 32>;
 var<workgroup> brightness: array<f32, 64>;
 #endif
 
-fn texel_surface(texel: vec2u, face: u32) -> Surface {
+fn texel_surface(texel: vec2u, face: RsmFace) -> Surface {
+    let place = rsm_texel(face, texel);
     var packed: PackedSurface;
-    packed.core = textureLoad(rsm_core, texel, face, 0).xy;
+    packed.core = textureLoad(rsm_core, place, face.layer, 0).xy;
 #ifdef SPECULAR
-    packed.specular = textureLoad(rsm_specular, texel, face, 0).x;
+    packed.specular = textureLoad(rsm_specular, place, face.layer, 0).x;
 #endif
 #ifdef NORMAL_MAP
-    packed.geometric_normal = textureLoad(rsm_geometric_normal, texel, face, 0).x;
+    packed.geometric_normal = textureLoad(rsm_geometric_normal, place, face.layer, 0).x;
 #endif
     return unpack_surface(packed);
 }
 
 fn texel_weight(texel: vec2u, face_index: u32) -> f32 {
-    let resolution = textureDimensions(rsm_depth).x;
-    if any(texel >= vec2u(resolution)) {
-        return 0.0;
-    }
-    let depth = textureLoad(rsm_depth, texel, face_index, 0);
-    if depth <= 0.0 {
+    if face_index >= arrayLength(&faces) {
         return 0.0;
     }
     let face = faces[face_index];
+    let resolution = face.resolution;
+    if any(texel >= vec2u(resolution)) {
+        return 0.0;
+    }
+    let depth = textureLoad(rsm_depth, rsm_texel(face, texel), face.layer, 0);
+    if depth <= 0.0 {
+        return 0.0;
+    }
     let uv = rsm_texel_uv(texel, resolution);
     let flux = rsm_flux(face, lights[face.light], uv, f32(resolution));
-    return reflected_flux(texel_surface(texel, face_index), flux, rsm_direction_to_light(face, rsm_position(face, uv, depth)));
+    return face.weight * reflected_flux(texel_surface(texel, face), flux, rsm_direction_to_light(face, rsm_position(face, uv, depth)));
 }
 
 @compute @workgroup_size(8, 8)
@@ -129,27 +133,28 @@ fn weigh(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= textureDimensions(weights)) {
         return;
     }
-    textureStore(weights, id.xy, id.z, vec4f(storable_weight(texel_weight(id.xy, id.z)), 0.0, 0.0, 0.0));
+    let place = density_place(id.xy, id.z, textureDimensions(weights).x, density_side(faces[0].resolution));
+    textureStore(weights, id.xy, id.z, vec4f(storable_weight(texel_weight(place.texel, place.face)), 0.0, 0.0, 0.0));
 }
 
 // `share`: of how many patches the cell has the flux.
 fn load_emitter(texel: vec2u, face_index: u32, share: f32) -> Emitter {
     var emitter: Emitter;
-    let resolution = textureDimensions(rsm_depth).x;
-    let depth = textureLoad(rsm_depth, texel, face_index, 0);
+    let face = faces[face_index];
+    let resolution = face.resolution;
+    let depth = textureLoad(rsm_depth, rsm_texel(face, texel), face.layer, 0);
     if any(texel >= vec2u(resolution)) || depth <= 0.0 {
         return emitter;
     }
-    let face = faces[face_index];
     let uv = rsm_texel_uv(texel, resolution);
     let flux = rsm_flux(face, lights[face.light], uv, f32(resolution));
-    let surface = texel_surface(texel, face_index);
+    let surface = texel_surface(texel, face);
     emitter.position = rsm_lifted_position(face, uv, depth, surface.geometric_normal, f32(resolution));
     emitter.flux = flux / max(max(max(flux.x, flux.y), flux.z), 1e-38);
     emitter.normal = surface.normal;
     emitter.geometric_normal = surface.geometric_normal;
     emitter.to_source = rsm_direction_to_light(face, emitter.position);
-    emitter.reflected = reflected_flux(surface, emitter.flux, emitter.to_source);
+    emitter.reflected = face.weight * reflected_flux(surface, emitter.flux, emitter.to_source);
     emitter.brdf = brdf_from_surface(surface);
     let width = rsm_footprint(face, depth, f32(resolution)) * f32(1u << settings.level);
     let slant = max(dot(surface.geometric_normal, emitter.to_source), 0.1);
@@ -285,7 +290,7 @@ fn scale_view_samples(local: u32, first_emitter: u32) {
         var emitter: Emitter;
         let found = sample_density(flux_sums, r2_point(first_emitter + local, ~settings.seed));
         if found.probability > 0.0 {
-            let flux = textureLoad(flux_sums, found.texel >> vec2u(settings.level), found.face, settings.level).x;
+            let flux = density_weight(flux_sums, vec2i(found.texel >> vec2u(settings.level)), i32(found.face), i32(settings.level));
             emitter = load_emitter(found.texel, found.face, patch_share(flux));
         }
         emitters[local] = emitter;
@@ -326,7 +331,7 @@ fn estimate(
     let face = group / (stride * stride);
     let place = group % (stride * stride);
     let cell = vec2u(place % stride, place / stride) + stride * vec2u(local % 8u, local / 8u);
-    let flux = textureLoad(flux_sums, cell, face, settings.level).x;
+    let flux = density_weight(flux_sums, vec2i(cell), i32(face), i32(settings.level));
     let share = patch_share(flux);
     let index = (face * settings.cells + cell.y) * settings.cells + cell.x;
     // A multiple of the run's length, taken modulo the number of samples: all of them are met equally often.

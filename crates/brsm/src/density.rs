@@ -295,8 +295,8 @@ impl Pass for BrsmPass {
         let words = [self.cells, level, samples, subset, seed, (patches as f32).to_bits(), 0, 0];
         frame.write_buffer(&self.buffers.estimate_settings, bytemuck::cast_slice(&words));
 
-        let texels = self.shape.side().div_ceil(8);
-        dispatch(frame, "weigh by flux", &self.pipelines.weigh, &bindings.weigh, [texels, texels, faces]);
+        let (texels, layers) = (self.shape.layer_side().div_ceil(8), self.shape.layers());
+        dispatch(frame, "weigh by flux", &self.pipelines.weigh, &bindings.weigh, [texels, texels, layers]);
         self.levels.record(frame, &bindings.levels);
 
         let groups = (self.cells / 8) * (self.cells / 8) * faces;
@@ -314,7 +314,7 @@ impl Pass for BrsmPass {
         let cells = self.cells / 8;
         dispatch(frame, "blur", &self.pipelines.blur, &bindings.blur, [cells, cells, faces]);
         dispatch(frame, "add up contributions", &self.pipelines.add_up, &bindings.add_up, [1, 1, 1]);
-        dispatch(frame, "combine", &self.pipelines.combine, &bindings.combine, [texels, texels, faces]);
+        dispatch(frame, "combine", &self.pipelines.combine, &bindings.combine, [texels, texels, layers]);
         self.levels.record(frame, &bindings.levels);
         Ok(())
     }

@@ -1,7 +1,7 @@
 // From ratios of contribution to flux per cell to weights of texels: `blur` brings neighbouring cells together and adds up, `add_up` ends the sum, `combine`
 // multiplies the flux of every texel.
 
-#import lobelia::sampling_density::{sampling_density_total, storable_weight}
+#import lobelia::sampling_density::{density_place, density_weight, sampling_density_total, storable_weight}
 
 struct Settings {
     // Cells a side of each face: a power of two, at least 8.
@@ -58,7 +58,7 @@ fn blur(
                 let ratio = ratios[cell_index(vec2u(other), id.z)];
                 if ratio >= 0.0 {
                     // Empty cells have no flux and so no say.
-                    let w = f32((2 - abs(x)) * (2 - abs(y))) * (textureLoad(flux_sums, other, i32(id.z), i32(settings.level)).x * scale);
+                    let w = f32((2 - abs(x)) * (2 - abs(y))) * (density_weight(flux_sums, other, i32(id.z), i32(settings.level)) * scale);
                     weighted += w * ratio;
                     weight += w;
                 }
@@ -67,7 +67,7 @@ fn blur(
     }
     let ratio = select(-1.0, weighted / weight, weight > 0.0);
     blurred[cell_index(id.xy, id.z)] = ratio;
-    let share = select(0.0, textureLoad(flux_sums, id.xy, id.z, settings.level).x * scale, ratio >= 0.0);
+    let share = select(0.0, density_weight(flux_sums, vec2i(id.xy), i32(id.z), i32(settings.level)) * scale, ratio >= 0.0);
     sums[local] = vec2f(share * ratio, share);
     reduce(local, 64u);
     if local == 0u {
@@ -94,9 +94,13 @@ fn combine(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let mean = mean_ratio[0];
-    let ratio = blurred[cell_index(id.xy >> vec2u(settings.level), id.z)];
+    let place = density_place(id.xy, id.z, textureDimensions(weights).x, settings.cells << settings.level);
+    let flux = textureLoad(weights, id.xy, id.z).x;
+    if flux <= 0.0 {
+        return;
+    }
+    let ratio = blurred[cell_index(place.texel >> vec2u(settings.level), place.face)];
     let known = ratio >= 0.0 && mean > 0.0 && mean < 1e30;
     let factor = select(1.0, (1.0 - settings.flux_share) * (ratio / max(mean, 1e-38)) + settings.flux_share, known);
-    let flux = textureLoad(weights, id.xy, id.z).x;
     textureStore(weights, id.xy, id.z, vec4f(storable_weight(flux * factor), 0.0, 0.0, 0.0));
 }

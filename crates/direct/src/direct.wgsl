@@ -4,7 +4,7 @@
 #import lobelia::light::light_sample
 #import lobelia::math::{safe_normalize, storable}
 #import lobelia::octahedral::octahedral_unpack
-#import lobelia::reflective_shadow_map::{RsmFace, rsm_cube_face, rsm_direction_to_light, rsm_distance, rsm_project, rsm_ray, rsm_ray_origin}
+#import lobelia::reflective_shadow_map::{RsmFace, rsm_cube_face, rsm_direction_to_light, rsm_distance, rsm_project, rsm_ray, rsm_ray_origin, rsm_texel}
 #import lobelia::scene::{PunctualLight, View, scene_position}
 #import lobelia::surface::{PackedSurface, unpack_surface}
 
@@ -46,11 +46,12 @@ const MAX_FACTOR: f32 = 1e18;
 // Slopes, in texels of depth per texel, beyond which neither a texel's plane nor a receiver is believed.
 const MAX_SLOPE: f32 = 16.0;
 
-fn caster_normal(texel: vec2u, layer: u32) -> vec3f {
+fn caster_normal(face: RsmFace, texel: vec2u) -> vec3f {
+    let place = rsm_texel(face, texel);
 #ifdef NORMAL_MAP
-    return octahedral_unpack(textureLoad(rsm_normal, texel, layer, 0).x);
+    return octahedral_unpack(textureLoad(rsm_normal, place, face.layer, 0).x);
 #else
-    return octahedral_unpack(textureLoad(rsm_core, texel, layer, 0).x);
+    return octahedral_unpack(textureLoad(rsm_core, place, face.layer, 0).x);
 #endif
 }
 
@@ -62,74 +63,152 @@ struct Receiver {
     uv: vec2f,
     // Along the face's forward axis, metres.
     distance: f32,
-    // Metres by which a caster must stand before it.
+    // Metres by which a caster must stand before it, where both may be one curved surface.
     slack: f32,
-    // What rounding makes of distances, metres.
+    // And where they are not: what rounding makes of distances, and rasterisation of edges.
     rounding: f32,
     // How far the plane of a texel is trusted, metres.
     reach: f32,
 }
 
-// Whether the surface in one texel stands between the light and the receiver.
-fn shades(face: RsmFace, layer: u32, texel: vec2u, depth: f32, receiver: Receiver) -> bool {
+// What a texel says of a receiver.
+struct Tap {
+    // Its surface stands between the light and the receiver.
+    shades: bool,
+    // Its surface is the receiver's own.
+    own: bool,
+    position: vec3f,
+    normal: vec3f,
+}
+
+fn look(face: RsmFace, texel: vec2u, receiver: Receiver) -> Tap {
+    var tap: Tap;
+    let depth = textureLoad(rsm_depth, rsm_texel(face, texel), face.layer, 0);
+    if depth <= 0.0 {
+        return tap;
+    }
     let caster = rsm_distance(face, depth);
 #ifdef DEPTH_COMPARISON
-    return caster < receiver.distance - receiver.slack;
+    tap.shades = caster < receiver.distance - receiver.slack;
+    tap.own = !tap.shades;
 #else
+    let texel_uv = (vec2f(texel) + vec2f(0.5)) / f32(face.resolution);
+    tap.position = rsm_ray_origin(face, texel_uv) + rsm_ray(face, texel_uv) * caster;
+    tap.normal = caster_normal(face, texel);
+    let offset = tap.position - receiver.position;
+    let height = dot(offset, receiver.normal);
+    // On a smooth surface a place lies off the plane of another by half their distance times the turn of the normal between them.
+    let turn = tap.normal - receiver.normal;
+    let continuous = dot(tap.normal, receiver.normal) > 0.5;
+    tap.own = continuous && abs(height) <= receiver.slack + length(offset) * length(turn);
     // Past a convex edge the receiver is met below the other side's plane, but no caster stands behind the receiver's own plane.
-    let texel_uv = (vec2f(texel) + vec2f(0.5)) / f32(textureDimensions(rsm_depth).x);
-    let seen = rsm_ray_origin(face, texel_uv) + rsm_ray(face, texel_uv) * caster;
-    if dot(seen - receiver.position, receiver.normal) <= receiver.rounding {
-        return false;
+    if height <= receiver.rounding {
+        return tap;
     }
-    let normal = caster_normal(texel, layer);
-    let descent = dot(rsm_ray(face, receiver.uv), normal);
-    let rise = dot(seen - rsm_ray_origin(face, receiver.uv), normal);
+    let descent = dot(rsm_ray(face, receiver.uv), tap.normal);
+    let rise = dot(tap.position - rsm_ray_origin(face, receiver.uv), tap.normal);
     // A plane seen edge-on says nothing about its neighbourhood.
     let met = select(caster, clamp(rise / descent, caster - receiver.reach, caster + receiver.reach), abs(descent) > 1e-4);
-    return met < receiver.distance - receiver.slack;
+    tap.shades = met < receiver.distance - select(receiver.rounding, receiver.slack, continuous);
+    tap.own = tap.own && !tap.shades;
 #endif
+    return tap;
+}
+
+fn texel_at(face: RsmFace, place: vec2i) -> vec2u {
+    return vec2u(clamp(place, vec2i(0), vec2i(i32(face.resolution) - 1)));
 }
 
 // Share of the filter's texels past which the light is seen.
 fn shadow(first: RsmFace, position: vec3f, geometric_normal: vec3f) -> f32 {
-    var layer = first.first_face;
-    if first.face_count == 6u {
-        layer += rsm_cube_face(position - first.position);
+    let orthographic = first.depth_range != 0.0;
+    var index = first.first_face;
+    if orthographic {
+        // The finest that holds the filter too; the last holds everything.
+        let last = first.first_face + first.face_count - 1u;
+        let inset = vec2f(0.5 * f32(settings.filter_width) + 0.5) / f32(first.resolution);
+        while index < last {
+            let uv = rsm_project(faces[index], position).xy;
+            if all(uv >= inset) && all(uv <= vec2f(1.0) - inset) {
+                break;
+            }
+            index += 1u;
+        }
+    } else if first.face_count == 6u {
+        index += rsm_cube_face(position - first.position);
     }
-    let face = faces[layer];
-    let resolution = f32(textureDimensions(rsm_depth).x);
+    let face = faces[index];
+    let resolution = f32(face.resolution);
     let projected = rsm_project(face, position);
-    if projected.z <= 0.0 || any(projected.xy < vec2f(0.0)) || any(projected.xy > vec2f(1.0)) {
+    if projected.z <= select(0.0, face.near, orthographic) || any(projected.xy < vec2f(0.0)) || any(projected.xy > vec2f(1.0)) {
         return 1.0;
     }
     let width_at_one = 2.0 * length(face.right) / resolution;
-    let footprint = select(width_at_one * projected.z, width_at_one, face.depth_range != 0.0);
-    let rounding = projected.z * 2.44140625e-4;
-    var slack = settings.bias * footprint + rounding;
+    let footprint = select(width_at_one * projected.z, width_at_one, orthographic);
+    let depth_scale = select(projected.z, max(projected.z, 0.5 * length(face.right)), orthographic);
+    var slack = settings.bias * footprint + max(depth_scale * 2.44140625e-4, face.rounding);
 #ifdef DEPTH_COMPARISON
     // Over one texel the receiver's own depth changes by the tangent of its slope.
     let cosine = abs(dot(geometric_normal, rsm_direction_to_light(face, position)));
     slack += settings.bias * footprint * min(sqrt(max(1.0 - cosine * cosine, 0.0)) / max(cosine, 1e-3), MAX_SLOPE);
 #endif
+    // Rasterisers place corners to 1/256 of a texel.
+    let rounding = max(depth_scale * 1.52587890625e-5, face.rounding) + footprint / 32.0;
     let receiver = Receiver(position, geometric_normal, projected.xy, projected.z, slack, rounding, MAX_SLOPE * footprint);
     let width = i32(settings.filter_width);
     let corner = projected.xy * resolution - vec2f(0.5 * f32(width));
     let base = vec2i(floor(corner));
     let fraction = corner - vec2f(base);
-    let last = i32(resolution) - 1;
     var lit = 0.0;
+    var own = false;
+    var shaded = 0.0;
+    // The texel that shades most of the filter.
+    var caster: Tap;
     for (var y = 0; y <= width; y++) {
         let weight_y = select(select(1.0, 1.0 - fraction.y, y == 0), fraction.y, y == width);
         for (var x = 0; x <= width; x++) {
-            let weight_x = select(select(1.0, 1.0 - fraction.x, x == 0), fraction.x, x == width);
-            let texel = vec2u(clamp(base + vec2i(x, y), vec2i(0), vec2i(last)));
-            let depth = textureLoad(rsm_depth, texel, layer, 0);
-            if depth <= 0.0 || !shades(face, layer, texel, depth, receiver) {
-                lit += weight_x * weight_y;
+            let weight = weight_y * select(select(1.0, 1.0 - fraction.x, x == 0), fraction.x, x == width);
+            let tap = look(face, texel_at(face, base + vec2i(x, y)), receiver);
+            if !tap.shades {
+                lit += weight;
+                own = own || tap.own;
+            } else if weight >= shaded {
+                shaded = weight;
+                caster = tap;
             }
         }
     }
+#ifndef DEPTH_COMPARISON
+    if caster.shades && lit > 0.0 {
+        // Whatever the light passes by, it must end on the receiver's own surface somewhere near: what is seen past the rim of a wall thinner than a texel says
+        // nothing about what is behind the wall.
+        if !own {
+            return 0.0;
+        }
+        // Where the receiver's surface meets the caster's in a concave edge, what lies in front of the caster is not what lies behind it.
+        for (var y = 0; y <= width; y++) {
+            let weight_y = select(select(1.0, 1.0 - fraction.y, y == 0), fraction.y, y == width);
+            for (var x = 0; x <= width; x++) {
+                let weight = weight_y * select(select(1.0, 1.0 - fraction.x, x == 0), fraction.x, x == width);
+                let tap = look(face, texel_at(face, base + vec2i(x, y)), receiver);
+                if tap.own && dot(tap.position - caster.position, caster.normal) > 0.0 {
+                    lit -= weight;
+                }
+            }
+        }
+    } else if !caster.shades && !own {
+        // In a corner the texels around may all be of what ends there: a look at those around them.
+        var shades = false;
+        for (var y = -1; y <= width + 1; y++) {
+            for (var x = -1; x <= width + 1; x++) {
+                let tap = look(face, texel_at(face, base + vec2i(x, y)), receiver);
+                shades = shades || tap.shades;
+                own = own || tap.own;
+            }
+        }
+        return select(1.0, 0.0, shades && !own);
+    }
+#endif
     return clamp(lit / f32(width * width), 0.0, 1.0);
 }
 #endif

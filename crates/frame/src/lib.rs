@@ -31,6 +31,6 @@ pub use light::{LightVisibility, LightVisibilityShape, VirtualLight, VirtualLigh
 pub use lobelia_scene::{LightClass, LightTransport};
 pub use patch_moments::{LobeLength, PatchMoments, PatchMomentsShape};
 pub use radiance::{DisplayImage, ImageShape, Radiance};
-pub use reflective_shadow_map::{ReflectiveShadowMap, ReflectiveShadowMapShape, RsmFace};
+pub use reflective_shadow_map::{MAX_LAYERS, ReflectiveShadowMap, ReflectiveShadowMapShape, RsmFace};
 pub use sampling_density::{SamplingDensity, SamplingDensityBindings, SamplingDensityLevels, SamplingDensityShape};
 pub use world::SceneWorld;

@@ -1,4 +1,4 @@
-use crate::ReflectiveShadowMapShape;
+use crate::{ReflectiveShadowMapShape, reflective_shadow_map::tiles_for};
 use lobelia_graph::{BuildError, ComputePipeline, Frame, Gpu, Part, PartSet, PortError, Resource, TexturePart, Values};
 use lobelia_shaders::{Flags, Source};
 use wgpu::{TextureFormat, TextureUsages};
@@ -23,6 +23,21 @@ impl SamplingDensityShape {
         self.side().ilog2() + 1
     }
 
+    /// Faces along each side of a layer, as in the map.
+    pub fn tiles(&self) -> u32 {
+        tiles_for(self.faces)
+    }
+
+    /// Side of the finest level of a layer.
+    pub fn layer_side(&self) -> u32 {
+        self.side() * self.tiles()
+    }
+
+    /// Layers, as in the map.
+    pub fn layers(&self) -> u32 {
+        self.faces.max(1).div_ceil(self.tiles().pow(2))
+    }
+
     /// Refuses a density of another map than the one that lights are picked from.
     pub fn check(&self, rsm: &ReflectiveShadowMapShape) -> Result<(), PortError> {
         if (self.resolution, self.faces) == (rsm.resolution, rsm.faces) {
@@ -43,8 +58,8 @@ impl SamplingDensityShape {
 /// `lobelia::sampling_density`; [`SamplingDensityLevels`] makes the sums.
 #[derive(Clone, Debug)]
 pub struct SamplingDensity {
-    /// `r32float`, an array of faces with all mip levels. Level 0 is padded with zeros to a power of two. Weights are at most 1e28, so that no sum
-    /// overflows.
+    /// `r32float`, faces in the layers and tiles that they have in the map, with mip levels down to one texel a face. Level 0 is padded with zeros to a
+    /// power of two. Weights are at most 1e28, so that no sum overflows.
     pub weights: TexturePart,
     /// Size.
     pub shape: SamplingDensityShape,
@@ -58,7 +73,7 @@ impl Resource for SamplingDensity {
 
     fn parts(shape: &SamplingDensityShape) -> Vec<Part> {
         let usage = TextureUsages::STORAGE_BINDING;
-        let weights = Part::layered_texture("weights", TextureFormat::R32Float, [shape.side(); 2], shape.faces.max(1), usage);
+        let weights = Part::layered_texture("weights", TextureFormat::R32Float, [shape.layer_side(); 2], shape.layers(), usage);
         vec![weights.always_array().mips(shape.levels()).values(Values::NonNegative)]
     }
 
@@ -72,10 +87,10 @@ pub struct SamplingDensityLevels {
     pipeline: ComputePipeline,
 }
 
-/// One group for each level above the finest, with its number of texels a side.
+/// One group for each level above the finest, with its number of texels along each side of a layer.
 pub struct SamplingDensityBindings {
     levels: Vec<(wgpu::BindGroup, u32)>,
-    faces: u32,
+    layers: u32,
 }
 
 impl SamplingDensityLevels {
@@ -95,9 +110,9 @@ impl SamplingDensityLevels {
                 .view("finer", &density.weights.mip_view(upper - 1))
                 .view("coarser", &density.weights.mip_view(upper))
                 .build(gpu)?;
-            Ok::<_, BuildError>((group, shape.side() >> upper))
+            Ok::<_, BuildError>((group, shape.layer_side() >> upper))
         };
-        Ok(SamplingDensityBindings { levels: (1..shape.levels()).map(level).collect::<Result<_, _>>()?, faces: shape.faces.max(1) })
+        Ok(SamplingDensityBindings { levels: (1..shape.levels()).map(level).collect::<Result<_, _>>()?, layers: shape.layers() })
     }
 
     /// Records the sums. The finest level must have been written.
@@ -106,7 +121,7 @@ impl SamplingDensityLevels {
             frame.compute("add up weights", |pass| {
                 pass.set_pipeline(self.pipeline.raw());
                 pass.set_bind_group(0, group, &[]);
-                pass.dispatch_workgroups(side.div_ceil(8), side.div_ceil(8), bindings.faces);
+                pass.dispatch_workgroups(side.div_ceil(8), side.div_ceil(8), bindings.layers);
             });
         }
     }

@@ -140,6 +140,13 @@ pub trait Pass: Sized + 'static {
         Vec::new()
     }
 
+    /// What a user should know of what this pass does not do, or not as asked, on this scene. Shown by whatever renders or explains; asked after
+    /// [`Pass::shape`] said that the pass can run.
+    fn warnings(context: &PlanContext<'_, Self>, inputs: &InputShapes<Self>) -> Vec<String> {
+        let _ = (context, inputs);
+        Vec::new()
+    }
+
     /// Shapes of the outputs, or what is wrong with the inputs.
     fn shape(context: &PlanContext<'_, Self>, inputs: &InputShapes<Self>) -> Result<OutputShapes<Self>, PortError>;
 

@@ -52,6 +52,8 @@ pub struct PlannedPass<W: World> {
     pub specialisations: Vec<Specialisation>,
     /// What it adds to a picture, if it states that.
     pub claim: Option<W::Claim>,
+    /// What a user should know, see [`crate::Pass::warnings`].
+    pub warnings: Vec<String>,
     /// For each input port, the producers that are left, as indices into [`Plan::resources`].
     pub inputs: Vec<Vec<usize>>,
     /// For each output port, its resource.
@@ -169,6 +171,11 @@ impl<W: World> Plan<W> {
     /// Memory that the same resources would take if none were shared.
     pub fn bytes_without_reuse(&self) -> u64 {
         self.resources.iter().map(PlannedResource::bytes).sum()
+    }
+
+    /// What the passes have to say to the user, each with the name of its pass.
+    pub fn warnings(&self) -> impl Iterator<Item = String> + '_ {
+        self.passes.iter().flat_map(|pass| pass.warnings.iter().map(|warning| format!("pass `{}`: {warning}", pass.name)))
     }
 
     /// Index of a kept resource by `pass.port` (or `pass` where that is unique); a forwarding pass answers with what it forwards.
@@ -488,6 +495,7 @@ impl<W: World> Planner<'_, W> {
             name: wired.name.clone(),
             claim: wired.kind.claim(wired.params.as_ref(), self.traits),
             specialisations,
+            warnings: wired.kind.warnings(&context, &values),
             inputs,
             outputs,
         });

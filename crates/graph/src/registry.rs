@@ -154,6 +154,7 @@ pub(crate) trait Kind<W: World>: 'static {
     fn claim(&self, params: &dyn AnyParams, traits: &W::Traits) -> Option<W::Claim>;
     fn specialise(&self, context: &ErasedPlanContext<'_, W>, inputs: &[PortValue]) -> Vec<Specialisation>;
     fn shape(&self, context: &ErasedPlanContext<'_, W>, inputs: &[PortValue]) -> Result<Vec<Vec<Box<dyn AnyShape>>>, PortError>;
+    fn warnings(&self, context: &ErasedPlanContext<'_, W>, inputs: &[PortValue]) -> Vec<String>;
     fn create(&self, context: &ErasedContext<'_, W>) -> Result<Box<dyn AnyPass<W>>, BuildError>;
 }
 
@@ -236,6 +237,10 @@ impl<P: Pass> Kind<P::World> for Registered<P> {
     fn shape(&self, context: &ErasedPlanContext<'_, P::World>, inputs: &[PortValue]) -> Result<Vec<Vec<Box<dyn AnyShape>>>, PortError> {
         let shapes = P::shape(&self.plan_context(context), &self.inputs(inputs)?)?;
         Ok(P::Outputs::erase(&shapes))
+    }
+
+    fn warnings(&self, context: &ErasedPlanContext<'_, P::World>, inputs: &[PortValue]) -> Vec<String> {
+        self.inputs(inputs).map_or_else(|_| Vec::new(), |inputs| P::warnings(&self.plan_context(context), &inputs))
     }
 
     fn create(&self, context: &ErasedContext<'_, P::World>) -> Result<Box<dyn AnyPass<P::World>>, BuildError> {

@@ -33,6 +33,9 @@ fn write_text(out: &mut String, plan: &Plan<SceneWorld>, general: Option<&Plan<S
             let state = if specialisation.on { "on " } else { "off" };
             writeln!(out, "        {state} {}: {}", specialisation.flag, specialisation.reason)?;
         }
+        for warning in &pass.warnings {
+            writeln!(out, "        warning: {warning}")?;
+        }
     }
     writeln!(out, "\ndropped")?;
     if plan.dropped.is_empty() {

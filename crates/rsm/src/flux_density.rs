@@ -13,8 +13,9 @@ use lobelia_shaders::Source;
 pub struct FluxDensityPass {
     weigh: ComputePipeline,
     levels: SamplingDensityLevels,
-    faces: u32,
+    /// Of a layer, in texels.
     side: u32,
+    layers: u32,
 }
 
 /// Input ports.
@@ -66,8 +67,8 @@ impl Pass for FluxDensityPass {
         Ok(Self {
             weigh: context.gpu.compute_pipeline(context.name, source, "weigh", context.flags)?,
             levels: SamplingDensityLevels::new(context.gpu)?,
-            faces: shape.faces,
-            side: shape.side(),
+            side: shape.layer_side(),
+            layers: shape.layers(),
         })
     }
 
@@ -92,7 +93,7 @@ impl Pass for FluxDensityPass {
         frame.compute("weigh texels", |pass| {
             pass.set_pipeline(self.weigh.raw());
             pass.set_bind_group(0, &bindings.weigh, &[]);
-            pass.dispatch_workgroups(groups, groups, self.faces);
+            pass.dispatch_workgroups(groups, groups, self.layers);
         });
         self.levels.record(frame, &bindings.levels);
         Ok(())

@@ -1,7 +1,7 @@
 // Averages of patches: `begin` makes the records of 4 x 4 texels from the map, `merge` those of each coarser level from the one below.
 
 #import lobelia::patch_moments::{PatchMoments, StoredPatchMoments, merge_patch_moments, pack_patch_moments, patch_moments_address, patch_of_texel, unpack_patch_moments}
-#import lobelia::reflective_shadow_map::{RsmFace, rsm_texel_uv}
+#import lobelia::reflective_shadow_map::{RsmFace, rsm_texel, rsm_texel_uv}
 #import lobelia::scene::PunctualLight
 #import lobelia::surface::{PackedSurface, unpack_surface}
 
@@ -28,24 +28,25 @@ struct Settings {
 @group(0) @binding(7) var<storage, read_write> moments: array<StoredPatchMoments>;
 
 fn patch_at(texel: vec2u, face_index: u32) -> PatchMoments {
-    let resolution = textureDimensions(rsm_depth).x;
+    let face = faces[face_index];
+    let resolution = face.resolution;
     var none: PatchMoments;
     if any(texel >= vec2u(resolution)) {
         return none;
     }
-    let depth = textureLoad(rsm_depth, texel, face_index, 0);
+    let place = rsm_texel(face, texel);
+    let depth = textureLoad(rsm_depth, place, face.layer, 0);
     if depth <= 0.0 {
         return none;
     }
     var packed: PackedSurface;
-    packed.core = textureLoad(rsm_core, texel, face_index, 0).xy;
+    packed.core = textureLoad(rsm_core, place, face.layer, 0).xy;
 #ifdef SPECULAR
-    packed.specular = textureLoad(rsm_specular, texel, face_index, 0).x;
+    packed.specular = textureLoad(rsm_specular, place, face.layer, 0).x;
 #endif
 #ifdef NORMAL_MAP
-    packed.geometric_normal = textureLoad(rsm_geometric_normal, texel, face_index, 0).x;
+    packed.geometric_normal = textureLoad(rsm_geometric_normal, place, face.layer, 0).x;
 #endif
-    let face = faces[face_index];
     return patch_of_texel(face, lights[face.light], rsm_texel_uv(texel, resolution), f32(resolution), depth, unpack_surface(packed));
 }
 

@@ -105,7 +105,7 @@ struct Map {
     scene: Arc<Scene>,
 }
 
-const FACE_WORDS: usize = 36;
+const FACE_WORDS: usize = 44;
 const LIGHT_WORDS: usize = 12;
 
 fn records(bytes: &[u8], words: usize) -> Vec<Vec<u32>> {

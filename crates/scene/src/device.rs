@@ -140,6 +140,11 @@ impl GpuScene {
         self.version.get()
     }
 
+    /// The camera of the next frame, if one was set: without jitter, frame and seed.
+    pub fn camera(&self) -> Option<ViewUniform> {
+        self.seen.get()
+    }
+
     /// Writes the camera of the next frame.
     pub fn set_view(&self, queue: &wgpu::Queue, view: &ViewUniform) {
         let camera = view.camera_only();

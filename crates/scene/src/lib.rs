@@ -50,6 +50,7 @@ mod mesh;
 mod motion;
 mod ndf;
 mod nodes;
+mod sight;
 mod tangents;
 mod traits;
 mod transport;
@@ -62,7 +63,8 @@ pub use light::{AreaLight, AreaShape, Environment, LightKind, PunctualLight, tri
 pub use material::{AlphaMode, MIN_ALPHA, Material, Sampler, Texture, TextureRef, Wrap};
 pub use mesh::{Mesh, Triangle};
 pub use ndf::Ndf;
-pub use traits::{Bounds, CUBE_FACE_OUTER, SceneTraits};
+pub use sight::{Lookout, Sight};
+pub use traits::{Bounds, CUBE_FACE_OUTER, CoarseLight, SceneTraits};
 pub use transport::{LightClass, LightTransport};
 
 use glam::{DMat4, DVec3};

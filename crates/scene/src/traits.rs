@@ -46,6 +46,19 @@ impl Bounds {
     }
 }
 
+/// A light whose map may be too coarse for what a camera sees.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CoarseLight {
+    /// Its name.
+    pub light: String,
+    /// Camera.
+    pub camera: String,
+    /// What one face of its map covers where that camera looks, metres.
+    pub face_width: f64,
+    /// Width of what is seen there, metres.
+    pub sight_width: f64,
+}
+
 /// What a scene has, as far as passes care. Decides what is pruned and how shaders are specialised.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SceneTraits {
@@ -85,6 +98,10 @@ pub struct SceneTraits {
     pub directional_lights: usize,
     /// Point lights, and spots too wide for one face: each takes six faces of a shadow map.
     pub cube_lights: usize,
+    /// Faces of the shadow map of each directional light: 1, or more, each lying in the next, where cameras see a small part of a large scene.
+    pub directional_faces: usize,
+    /// Lights that are far away, or directional in a scene that is large, for what a camera sees: each with the camera that sees the smallest part.
+    pub coarse_lights: Vec<CoarseLight>,
     /// Quad lights.
     pub quad_lights: usize,
     /// Disk lights.
@@ -202,6 +219,7 @@ pub(crate) fn of(scene: &Scene) -> SceneTraits {
         LightKind::Spot { outer, .. } => *outer > CUBE_FACE_OUTER,
         LightKind::Directional => false,
     };
+    let (directional_faces, coarse_lights) = crate::sight::facts(scene);
     SceneTraits {
         triangles,
         instances: scene.instances.len(),
@@ -221,6 +239,8 @@ pub(crate) fn of(scene: &Scene) -> SceneTraits {
         spot_lights: lights(|kind| matches!(kind, LightKind::Spot { .. })),
         directional_lights: lights(|kind| matches!(kind, LightKind::Directional)),
         cube_lights: scene.lights.iter().filter(|light| wide(&light.kind)).count(),
+        directional_faces,
+        coarse_lights,
         quad_lights: area(|shape| matches!(shape, AreaShape::Quad { .. })),
         disk_lights: area(|shape| matches!(shape, AreaShape::Disk { .. })),
         sphere_lights: area(|shape| matches!(shape, AreaShape::Sphere { .. })),

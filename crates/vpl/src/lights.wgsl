@@ -1,7 +1,7 @@
 // Picks virtual lights from the texels of reflective shadow maps with the points of a low-discrepancy sequence.
 
 #import lobelia::octahedral::octahedral_pack
-#import lobelia::reflective_shadow_map::{RsmFace, rsm_direction_to_light, rsm_flux, rsm_lifted_position, rsm_texel_uv}
+#import lobelia::reflective_shadow_map::{RsmFace, rsm_direction_to_light, rsm_flux, rsm_lifted_position, rsm_texel, rsm_texel_uv}
 #import lobelia::sampling::r2_point
 #import lobelia::sampling_density::sample_density
 #import lobelia::scene::PunctualLight
@@ -29,14 +29,15 @@ struct Settings {
 @group(0) @binding(7) var weights: texture_2d_array<f32>;
 @group(0) @binding(8) var<storage, read_write> virtual_lights: array<VirtualLight>;
 
-fn packed_texel(texel: vec2u, face: u32) -> PackedSurface {
+fn packed_texel(texel: vec2u, face: RsmFace) -> PackedSurface {
+    let place = rsm_texel(face, texel);
     var packed: PackedSurface;
-    packed.core = textureLoad(rsm_core, texel, face, 0).xy;
+    packed.core = textureLoad(rsm_core, place, face.layer, 0).xy;
 #ifdef SPECULAR
-    packed.specular = textureLoad(rsm_specular, texel, face, 0).x;
+    packed.specular = textureLoad(rsm_specular, place, face.layer, 0).x;
 #endif
 #ifdef NORMAL_MAP
-    packed.geometric_normal = textureLoad(rsm_geometric_normal, texel, face, 0).x;
+    packed.geometric_normal = textureLoad(rsm_geometric_normal, place, face.layer, 0).x;
 #endif
     return packed;
 }
@@ -50,15 +51,15 @@ fn pick(@builtin(global_invocation_id) id: vec3u) {
     light.direction_to_source = vec3f(0.0, 1.0, 0.0);
     light.geometric_normal = octahedral_pack(vec3f(0.0, 1.0, 0.0));
     let sample = sample_density(weights, r2_point(id.x, settings.seed));
-    let depth = textureLoad(rsm_depth, sample.texel, sample.face, 0);
+    let face = faces[sample.face];
+    let depth = textureLoad(rsm_depth, rsm_texel(face, sample.texel), face.layer, 0);
     if sample.probability <= 0.0 || depth <= 0.0 {
         virtual_lights[id.x] = light;
         return;
     }
-    let face = faces[sample.face];
-    let resolution = textureDimensions(rsm_depth).x;
+    let resolution = face.resolution;
     let uv = rsm_texel_uv(sample.texel, resolution);
-    let packed = packed_texel(sample.texel, sample.face);
+    let packed = packed_texel(sample.texel, face);
     let surface = unpack_surface(packed);
     light.position = rsm_lifted_position(face, uv, depth, surface.geometric_normal, f32(resolution));
     light.geometric_normal = octahedral_pack(surface.geometric_normal);

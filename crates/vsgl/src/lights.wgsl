@@ -5,9 +5,9 @@
 #import lobelia::microfacet_lobe::reflection_axis
 #import lobelia::octahedral::octahedral_pack
 #import lobelia::patch_moments::{PatchMoments, StoredPatchMoments, decode_sharpness, merge_patch_moments, patch_moments_address, patch_of_texel, patch_weight, unpack_patch_moments}
-#import lobelia::reflective_shadow_map::{RsmFace, rsm_direction_to_light, rsm_flux, rsm_footprint, rsm_lifted_position, rsm_texel_uv}
+#import lobelia::reflective_shadow_map::{RsmFace, rsm_direction_to_light, rsm_flux, rsm_footprint, rsm_lifted_position, rsm_texel, rsm_texel_uv}
 #import lobelia::sampling::r2_point
-#import lobelia::sampling_density::{sample_density, sampling_density_total}
+#import lobelia::sampling_density::{density_weight, sample_density, sampling_density_total}
 #import lobelia::scene::PunctualLight
 #import lobelia::surface::{PackedSurface, shading_normal_factor, unpack_surface}
 #import lobelia::virtual_lights::{VirtualLight, VirtualLightLobes}
@@ -43,30 +43,31 @@ struct Settings {
 @group(0) @binding(9) var<storage, read_write> virtual_lights: array<VirtualLight>;
 @group(0) @binding(10) var<storage, read_write> lobes: array<VirtualLightLobes>;
 
-fn packed_texel(texel: vec2u, face: u32) -> PackedSurface {
+fn packed_texel(texel: vec2u, face: RsmFace) -> PackedSurface {
+    let place = rsm_texel(face, texel);
     var packed: PackedSurface;
-    packed.core = textureLoad(rsm_core, texel, face, 0).xy;
+    packed.core = textureLoad(rsm_core, place, face.layer, 0).xy;
 #ifdef SPECULAR
-    packed.specular = textureLoad(rsm_specular, texel, face, 0).x;
+    packed.specular = textureLoad(rsm_specular, place, face.layer, 0).x;
 #endif
 #ifdef NORMAL_MAP
-    packed.geometric_normal = textureLoad(rsm_geometric_normal, texel, face, 0).x;
+    packed.geometric_normal = textureLoad(rsm_geometric_normal, place, face.layer, 0).x;
 #endif
     return packed;
 }
 
 fn patch_at(texel: vec2u, face_index: u32) -> PatchMoments {
-    let resolution = textureDimensions(rsm_depth).x;
+    let face = faces[face_index];
+    let resolution = face.resolution;
     var none: PatchMoments;
     if any(texel >= vec2u(resolution)) {
         return none;
     }
-    let face = faces[face_index];
-    let depth = textureLoad(rsm_depth, texel, face_index, 0);
+    let depth = textureLoad(rsm_depth, rsm_texel(face, texel), face.layer, 0);
     if depth <= 0.0 {
         return none;
     }
-    let surface = unpack_surface(packed_texel(texel, face_index));
+    let surface = unpack_surface(packed_texel(texel, face));
     return patch_of_texel(face, lights[face.light], rsm_texel_uv(texel, resolution), f32(resolution), depth, surface);
 }
 
@@ -162,7 +163,7 @@ fn patch_around(level: u32, texel: vec2u, face: u32, own: PatchMoments) -> Aroun
             if all(block >= vec2i(0)) && all(block < vec2i(side)) {
                 blocks[x] = block_at(level, vec2u(block), face);
                 shares[x] = across[x] * down[y] * share_of_surface(blocks[x], own, level);
-                weight += shares[x] * textureLoad(weights, block, face, i32(level)).x;
+                weight += shares[x] * density_weight(weights, block, i32(face), i32(level));
             }
         }
         row_shares[y] = shares.x + shares.y + shares.z;
@@ -177,7 +178,7 @@ fn mean_weight_around(level: u32, texel: vec2u, face: u32) -> f32 {
     let taps = taps_around(level, texel);
     var sum = 0.0;
     for (var index = 0; index < 4; index++) {
-        sum += taps.shares[index] * textureLoad(weights, tap(taps, index), face, i32(level)).x;
+        sum += taps.shares[index] * density_weight(weights, vec2i(tap(taps, index)), i32(face), i32(level));
     }
     return sum / f32(1u << (2u * level));
 }
@@ -193,16 +194,16 @@ fn pick(@builtin(global_invocation_id) id: vec3u) {
     var record: VirtualLightLobes;
     record.normal = light.geometric_normal;
     let sample = sample_density(weights, r2_point(id.x, settings.seed));
-    let depth = textureLoad(rsm_depth, sample.texel, sample.face, 0);
+    let face = faces[sample.face];
+    let depth = textureLoad(rsm_depth, rsm_texel(face, sample.texel), face.layer, 0);
     if sample.probability <= 0.0 || depth <= 0.0 {
         virtual_lights[id.x] = light;
         lobes[id.x] = record;
         return;
     }
-    let face = faces[sample.face];
-    let resolution = textureDimensions(rsm_depth).x;
+    let resolution = face.resolution;
     let uv = rsm_texel_uv(sample.texel, resolution);
-    let packed = packed_texel(sample.texel, sample.face);
+    let packed = packed_texel(sample.texel, face);
     let surface = unpack_surface(packed);
     light.position = rsm_lifted_position(face, uv, depth, surface.geometric_normal, f32(resolution));
     light.geometric_normal = octahedral_pack(surface.geometric_normal);

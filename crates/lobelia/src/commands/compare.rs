@@ -181,7 +181,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     options.keep.extend(arguments.shot.output.clone());
     let mut claims = Vec::new();
     for technique in &techniques {
-        claims.push(Claim::of_output(&technique.wired.plan(&scene.traits(), &options)?, arguments.shot.output.as_deref()));
+        let plan = technique.wired.plan(&scene.traits(), &options)?;
+        claims.push(Claim::of_output(&plan, arguments.shot.output.as_deref()));
+        warnings.extend(plan.warnings().map(|warning| format!("{}: {warning}", technique.name)));
     }
     let paths = light::truth_paths(arguments.truth.asked(), &claims);
     if !arguments.quiet {

@@ -104,6 +104,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let plan = wired.plan(&scene.traits(), &shot.plan_options())?;
     check_kinds(arguments, &plan)?;
     warn_uncast(arguments, &plan, &scene.traits());
+    if !arguments.quiet {
+        for warning in plan.warnings() {
+            eprintln!("warning: {warning}");
+        }
+    }
     drop(plan);
 
     let gpu = lobelia::graph::Gpu::new(&lobelia::graph::GpuOptions { adapter: arguments.adapter.clone(), baseline: arguments.baseline })?;
