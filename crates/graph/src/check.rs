@@ -21,6 +21,8 @@ pub struct Finding {
     pub non_finite: u64,
     /// Values below zero where that is wrong.
     pub negative: u64,
+    /// Half floats that stand at the largest, 65504: most likely cut off there.
+    pub saturated: u64,
 }
 
 /// Poisons and counts.
@@ -207,7 +209,7 @@ impl Checker {
         // Invocations stride over the words, so a fixed number of workgroups serves any size.
         compute.dispatch_workgroups(64, 1, 1);
         drop(compute);
-        self.open.push((Finding { pass: pass.into(), resource: resource.into(), non_finite: 0, negative: 0 }, counts));
+        self.open.push((Finding { pass: pass.into(), resource: resource.into(), non_finite: 0, negative: 0, saturated: 0 }, counts));
         Ok(())
     }
 
@@ -217,7 +219,7 @@ impl Checker {
         for (finding, counts) in self.open.drain(..) {
             let bytes = gpu.read_buffer(&counts)?;
             let word = |index: usize| u64::from(u32::from_le_bytes([bytes[index], bytes[index + 1], bytes[index + 2], bytes[index + 3]]));
-            findings.push(Finding { non_finite: word(0), negative: word(4), ..finding });
+            findings.push(Finding { non_finite: word(0), negative: word(4), saturated: word(8), ..finding });
         }
         Ok(findings)
     }

@@ -44,6 +44,22 @@ impl TextureData {
         texels.collect()
     }
 
+    /// The channels of `light` divided by the power of two that they were stored times, as 32-bit floats. Formats without floats stay as they are.
+    pub(crate) fn without_pre_exposure(self, light: u64, pre_exposure: f32) -> Self {
+        let wide = match self.format {
+            _ if light == 0 || pre_exposure == 1.0 => return self,
+            wgpu::TextureFormat::R16Float | wgpu::TextureFormat::R32Float => wgpu::TextureFormat::R32Float,
+            wgpu::TextureFormat::Rg16Float | wgpu::TextureFormat::Rg32Float => wgpu::TextureFormat::Rg32Float,
+            wgpu::TextureFormat::Rgba16Float | wgpu::TextureFormat::Rgba32Float => wgpu::TextureFormat::Rgba32Float,
+            _ => return self,
+        };
+        let channels = usize::from(wide.components());
+        let stored = |channel: usize| if light >> channel & 1 == 1 { pre_exposure } else { 1.0 };
+        let texels = self.to_f32_rgba();
+        let values = texels.iter().flat_map(|texel| (0..channels).map(|channel| texel[channel] / stored(channel)));
+        Self { extent: self.extent, format: wide, bytes: values.flat_map(f32::to_le_bytes).collect() }
+    }
+
     /// The raw 32-bit words.
     pub fn to_u32(&self) -> Vec<u32> {
         self.bytes.chunks_exact(4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]])).collect()

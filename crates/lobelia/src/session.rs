@@ -291,6 +291,11 @@ impl Rendering<'_> {
         &self.session.gpu
     }
 
+    /// What light is multiplied by on the device: [`GpuScene::pre_exposure`]. Everything that is read back here is without it.
+    pub fn pre_exposure(&self) -> f32 {
+        self.session.device.pre_exposure()
+    }
+
     /// `pass.port` of the radiance that the graph ends in, or that its display image shows; `None` where it ends in something else.
     pub fn linear_output(&self) -> Option<String> {
         self.linear.clone()

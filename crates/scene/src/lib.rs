@@ -42,6 +42,7 @@ mod builtin;
 mod camera;
 pub mod device;
 mod error;
+mod exposure;
 mod files;
 mod gltf;
 mod light;
