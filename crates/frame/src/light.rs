@@ -128,7 +128,7 @@ pub struct LightVisibilityShape {
 
 impl LightVisibilityShape {
     /// Most bytes that one buffer may have at the WebGPU baseline (storage binding size).
-    pub const CHUNK_BYTES: u64 = 128 << 20;
+    pub const CHUNK_BYTES: u64 = lobelia_graph::MAX_STORAGE_BINDING;
 
     /// Most lights that one pixel knows.
     pub fn lights_per_pixel(&self) -> u32 {

@@ -1,6 +1,9 @@
 //! Bringing textures and buffers back.
 
-use crate::{error::GpuError, gpu::Gpu};
+use crate::{
+    error::GpuError,
+    gpu::{Gpu, MAX_STORAGE_BINDING, rows_within},
+};
 use half::f16;
 
 /// Longest wait for an answer after the device's work is done.
@@ -84,19 +87,26 @@ impl Gpu {
         let [width, height] = [(texture.width() >> mip).max(1), (texture.height() >> mip).max(1)];
         let row = width * texel;
         let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let staging = self.staging(u64::from(padded) * u64::from(height));
-        let mut encoder = self.device().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("read back") });
-        encoder.copy_texture_to_buffer(
-            wgpu::TexelCopyTextureInfo { texture, mip_level: mip, origin: wgpu::Origin3d { x: 0, y: 0, z: layer }, aspect },
-            wgpu::TexelCopyBufferInfo {
-                buffer: &staging,
-                layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(padded), rows_per_image: Some(height) },
-            },
-            wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-        );
-        self.queue().submit([encoder.finish()]);
-        let padded_bytes = self.map(&staging)?;
-        let bytes = padded_bytes.chunks_exact(padded as usize).flat_map(|line| &line[..row as usize]).copied().collect();
+        let mut bytes = Vec::with_capacity(row as usize * height as usize);
+        // In bands of rows, since a buffer holds less than the largest texture.
+        let most = rows_within(MAX_STORAGE_BINDING, padded);
+        for y in (0..height).step_by(most as usize) {
+            let rows = most.min(height - y);
+            let staging = self.staging(u64::from(padded) * u64::from(rows));
+            let mut encoder = self.device().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("read back") });
+            encoder.copy_texture_to_buffer(
+                wgpu::TexelCopyTextureInfo { texture, mip_level: mip, origin: wgpu::Origin3d { x: 0, y, z: layer }, aspect },
+                wgpu::TexelCopyBufferInfo {
+                    buffer: &staging,
+                    layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(padded), rows_per_image: Some(rows) },
+                },
+                wgpu::Extent3d { width, height: rows, depth_or_array_layers: 1 },
+            );
+            self.queue().submit([encoder.finish()]);
+            for line in self.map(&staging)?.chunks_exact(padded as usize) {
+                bytes.extend_from_slice(&line[..row as usize]);
+            }
+        }
         Ok(TextureData { extent: [width, height], format, bytes })
     }
 

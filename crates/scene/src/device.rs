@@ -67,6 +67,7 @@ pub struct GpuScene {
     seen: Cell<Option<ViewUniform>>,
     version: Cell<u64>,
     pre_exposure: f32,
+    seen_size: f64,
 }
 
 const VERTEX_ATTRIBUTES: [wgpu::VertexAttribute; 4] =
@@ -97,7 +98,9 @@ impl GpuScene {
         let vertices = buffer("vertices", bytemuck::cast_slice(&vertex_data), wgpu::BufferUsages::VERTEX)?;
         let indices = buffer("indices", bytemuck::cast_slice(&index_data), wgpu::BufferUsages::INDEX)?;
         let view = buffer("view", &vec![0; ViewUniform::min_size().get() as usize], wgpu::BufferUsages::UNIFORM)?;
-        let pre_exposure = scene.pre_exposure();
+        let seen = scene.seen_points();
+        let pre_exposure = scene.pre_exposure_for(&seen);
+        let seen_size = scene.size_of(seen);
         let lights = buffer("lights", &light_bytes(&scene, pre_exposure), wgpu::BufferUsages::STORAGE)?;
         let (area_lights, area_light_vertices) = area_light_bytes(&scene, pre_exposure);
         let area_lights = buffer("area lights", &area_lights, wgpu::BufferUsages::STORAGE)?;
@@ -135,6 +138,7 @@ impl GpuScene {
             seen: Cell::new(None),
             version: Cell::new(0),
             pre_exposure,
+            seen_size,
         })
     }
 
@@ -142,6 +146,11 @@ impl GpuScene {
     /// it was uploaded. It stays the same as long as this lives, animations included, so that histories keep their meaning.
     pub fn pre_exposure(&self) -> f32 {
         self.pre_exposure
+    }
+
+    /// [`Scene::seen_size`] of the scene as it was uploaded, metres: what lengths are small or large against.
+    pub fn seen_size(&self) -> f64 {
+        self.seen_size
     }
 
     /// How often scene or camera changed. What a pass has gathered over frames is of another picture if this is not what it was.

@@ -4,7 +4,7 @@
 //! below it, so lights, emission and environment reach the device times a power of two, and whatever is read back is divided by it. Only what is
 //! cheap to know is asked: what the cameras see, and how much light would fall there if nothing stood in between.
 
-use crate::{AreaShape, Camera, LightKind, Scene};
+use crate::{AreaShape, LightKind, Scene, seen::SeenPoint};
 use glam::{DMat3, DVec3};
 use std::f64::consts::PI;
 
@@ -20,19 +20,18 @@ const LEAST: f64 = 1.0 / 1024.0;
 /// Largest exponent of the factor. Beyond it numbers are out of 32-bit floats' range as well.
 const MOST_STOPS: f64 = 96.0;
 
-/// Cameras that are asked, and rays through each picture (and fewer where there are so many triangles that it would take long).
-const CAMERAS: usize = 4;
-const RAYS: [usize; 2] = [16, 9];
-const TESTS: usize = 100_000_000;
-
 impl Scene {
     /// What light is multiplied by on the device: 1 for ordinary scenes, else the power of two that brings the upper quartile of diffuse radiance, as seen by
     /// the scene's cameras with every light unobstructed, to between 1/2 and 1; less where emission or environment would exceed half floats otherwise.
     ///
     /// It depends on the scene at its present time and nothing else. Highlights above 65504 over this factor are still cut off.
     pub fn pre_exposure(&self) -> f32 {
+        self.pre_exposure_for(&self.seen_points())
+    }
+
+    pub(crate) fn pre_exposure_for(&self, seen: &[SeenPoint]) -> f32 {
         let brightest = self.brightest_emission();
-        let usual = self.usual_radiance();
+        let usual = self.usual_radiance(seen);
         // Without light on any surface, emission is all that there is to see.
         let usual = if usual > 0.0 { usual } else { brightest };
         factor(usual, brightest)
@@ -49,32 +48,13 @@ impl Scene {
     }
 
     /// Upper quartile of what a white diffuse surface would reflect, over what the cameras see; 0 where no light reaches any of it.
-    fn usual_radiance(&self) -> f64 {
+    fn usual_radiance(&self, seen: &[SeenPoint]) -> f64 {
         let lights = self.illuminants();
         if lights.is_empty() {
             return 0.0;
         }
-        let cameras: Vec<Camera> = match self.cameras.iter().filter(|camera| camera.unusable.is_none()).take(CAMERAS) {
-            cameras if !self.cameras.is_empty() => cameras.cloned().collect(),
-            _ => self.camera(None).into_iter().collect(),
-        };
-        let seen = SeenSurfaces::new(self);
-        let budget = (TESTS / seen.triangles.max(1) / cameras.len().max(1)).max(1);
-        let [columns, rows] = if budget >= RAYS[0] * RAYS[1] { RAYS } else if budget >= 32 { [8, 4] } else { [3, 2] };
-        let mut values = Vec::new();
-        for camera in &cameras {
-            let tangent = (camera.yfov / 2.0).tan();
-            for index in 0..columns * rows {
-                let at = |place: usize, count: usize| (place as f64 + 0.5) / count as f64 * 2.0 - 1.0;
-                let (x, y) = (at(index % columns, columns), at(index / columns, rows));
-                // The picture's shape is not known here; most are about this wide.
-                let ray = camera.forward + camera.right * (x * tangent * 16.0 / 9.0) + camera.up * (y * tangent);
-                if let Some((position, normal)) = seen.first(camera.position, ray, camera.near) {
-                    let sum: f64 = lights.iter().map(|light| light.irradiance(position, normal)).sum();
-                    values.push(sum / PI);
-                }
-            }
-        }
+        let radiance = |point: &SeenPoint| lights.iter().map(|light| light.irradiance(point.position, point.normal)).sum::<f64>() / PI;
+        let mut values: Vec<f64> = seen.iter().map(radiance).collect();
         values.retain(|value| *value > 0.0 && value.is_finite());
         values.sort_by(f64::total_cmp);
         values.get(values.len() * 3 / 4).copied().unwrap_or(0.0)
@@ -148,81 +128,6 @@ impl Illuminant {
         };
         self.strength * falloff * normal.dot(direction).abs() / (distance * distance + self.area / PI)
     }
-}
-
-/// What rays meet.
-struct SeenSurfaces<'a> {
-    scene: &'a Scene,
-    /// Local bounds of each mesh.
-    bounds: Vec<[DVec3; 2]>,
-    triangles: usize,
-}
-
-impl<'a> SeenSurfaces<'a> {
-    fn new(scene: &'a Scene) -> Self {
-        let bounds = scene.meshes.iter().map(|mesh| {
-            mesh.positions.iter().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[least, most], position| {
-                [least.min(position.as_dvec3()), most.max(position.as_dvec3())]
-            })
-        });
-        let triangles = scene.instances.iter().map(|instance| scene.meshes[instance.mesh].indices.len() / 3).sum();
-        Self { scene, bounds: bounds.collect(), triangles }
-    }
-
-    /// The first surface, without those of area lights, and its unit normal; world space.
-    fn first(&self, from: DVec3, ray: DVec3, near: f64) -> Option<(DVec3, DVec3)> {
-        let mut nearest = f64::INFINITY;
-        let mut found = None;
-        for instance in self.scene.instances.iter().filter(|instance| instance.area_light.is_none()) {
-            let matrix = instance.world_from_local;
-            let determinant = matrix.determinant();
-            if !determinant.is_finite() || determinant == 0.0 {
-                continue;
-            }
-            let inverse = matrix.inverse();
-            let (origin, direction) = (inverse.transform_point3(from), inverse.transform_vector3(ray));
-            let mesh = &self.scene.meshes[instance.mesh];
-            if !meets_box(self.bounds[instance.mesh], origin, direction, nearest) {
-                continue;
-            }
-            for corners in mesh.indices.chunks_exact(3) {
-                let [a, b, c] = [corners[0], corners[1], corners[2]].map(|index| mesh.positions[index as usize].as_dvec3());
-                if let Some(distance) = meets_triangle([a, b, c], origin, direction).filter(|distance| (near..nearest).contains(distance)) {
-                    nearest = distance;
-                    found = Some((matrix, [a, b, c]));
-                }
-            }
-        }
-        let (matrix, corners) = found?;
-        let [a, b, c] = corners.map(|corner| matrix.transform_point3(corner));
-        Some((from + ray * nearest, (b - a).cross(c - a).normalize_or_zero()))
-    }
-}
-
-fn meets_box([least, most]: [DVec3; 2], origin: DVec3, direction: DVec3, nearest: f64) -> bool {
-    let (mut enter, mut leave) = (0.0_f64, nearest);
-    for axis in 0..3 {
-        let inverse = 1.0 / direction[axis];
-        let (a, b) = ((least[axis] - origin[axis]) * inverse, (most[axis] - origin[axis]) * inverse);
-        // NaN, from a ray within a plane of the box, leaves the interval as it is.
-        (enter, leave) = (enter.max(a.min(b)), leave.min(a.max(b)));
-    }
-    enter <= leave * (1.0 + 1e-12)
-}
-
-/// Distance along the ray, in lengths of `direction`.
-fn meets_triangle([a, b, c]: [DVec3; 3], origin: DVec3, direction: DVec3) -> Option<f64> {
-    let (ab, ac) = (b - a, c - a);
-    let across = direction.cross(ac);
-    let determinant = ab.dot(across);
-    if determinant == 0.0 {
-        return None;
-    }
-    let offset = origin - a;
-    let u = offset.dot(across) / determinant;
-    let along = offset.cross(ab);
-    let v = direction.dot(along) / determinant;
-    (u >= 0.0 && v >= 0.0 && u + v <= 1.0).then_some(ac.dot(along) / determinant)
 }
 
 #[cfg(test)]

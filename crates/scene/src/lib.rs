@@ -51,6 +51,7 @@ mod mesh;
 mod motion;
 mod ndf;
 mod nodes;
+mod seen;
 mod tangents;
 mod traits;
 mod wrapper;
@@ -280,9 +281,9 @@ impl Scene {
         camera.unwrap_or_else(|| unreachable!("the view is neither zero nor vertical"))
     }
 
-    /// Near plane where nobody gives one, metres: a thousandth of the scene's diagonal, at most 0.1 m.
+    /// Near plane where nobody gives one, metres: a thousandth of the scene's diagonal, at most 0.1 m, however small the scene is.
     pub(crate) fn usual_near(&self) -> f64 {
-        (2.0 * self.bounds().radius() * 1e-3).clamp(1e-4, 0.1)
+        (2.0 * self.bounds().radius() * 1e-3).clamp(1e-9, 0.1)
     }
 
     /// Bounds of all geometry in world space.

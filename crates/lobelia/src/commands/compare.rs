@@ -107,7 +107,7 @@ pub struct ShotArguments {
     /// Camera of the scene; its first if none is named.
     #[arg(long, value_name = "NAME")]
     pub camera: Option<String>,
-    /// Size of the pictures in pixels.
+    /// Size of the pictures in pixels, each side at most 8192.
     #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "480x270")]
     pub size: [u32; 2],
     /// Average this many sub-pixel-jittered frames in linear radiance; edges need 16 to be compared with a reference.

@@ -34,7 +34,7 @@ pub struct Arguments {
     /// Picture to write: .png (the graph's output as it is displayed) or .exr (linear RGB before tone mapping).
     #[arg(short, long, value_name = "FILE", required_unless_present = "saves")]
     output: Option<PathBuf>,
-    /// Size of the picture in pixels.
+    /// Size of the picture in pixels, each side at most 8192.
     #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "960x540")]
     size: [u32; 2],
     /// Camera of the scene; its first if none is named.
