@@ -23,7 +23,8 @@ struct View {
     seed: u32,
     // Times tan(yfov / 2).
     up: vec3f,
-    padding: u32,
+    // What everything in proportion to light is multiplied by: lights, emission and environment as they are stored, and so all radiance and flux.
+    pre_exposure: f32,
     // Pixels.
     extent: vec2f,
     // Added to the sample position, pixels, within [-0.5, 0.5].

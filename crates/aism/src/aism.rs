@@ -3,8 +3,8 @@
 use crate::surface::SurfaceCurve;
 use lobelia_frame::{GBuffer, LightVisibility, LightVisibilityShape, SceneWorld, VirtualLights};
 use lobelia_graph::{
-    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, ParamValue, Pass, PlanContext, PortError,
-    Ports, RunError, Specialisation, TraitsOf, WorkRate,
+    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, MAX_STORAGE_BINDING, Need, OutputShapes, ParamValue, Pass,
+    PlanContext, PortError, Ports, RunError, Specialisation, TraitsOf, WorkRate,
 };
 use lobelia_scene::Scene;
 use lobelia_shaders::Source;
@@ -148,9 +148,6 @@ const MAX_BYTES: u64 = 4 << 30;
 /// Most memory that maps, or weights of patches, may take: lights come in batches that fit.
 const BATCH_BYTES: u64 = 64 << 20;
 
-/// Most bytes of one storage binding at the WebGPU baseline.
-const MAX_BINDING: u64 = LightVisibilityShape::CHUNK_BYTES;
-
 impl Params {
     fn candidates(&self) -> u32 {
         self.candidates.next_multiple_of(256)
@@ -229,11 +226,11 @@ impl Pass for AismPass {
         let curve = SurfaceCurve::new(&scene.triangles());
         // Triangles of an animated scene can lose their area and find it again.
         let room = if context.traits.animated { context.traits.triangles } else { curve.len() }.max(1) as u64;
-        if 48 * room > MAX_BINDING {
+        if 48 * room > MAX_STORAGE_BINDING {
             let size = (48 * room) >> 20;
             return Err(BuildError::Other(format!(
                 "the triangles of the scene take {size} MiB; at most {} can be bound",
-                MAX_BINDING >> 20
+                MAX_STORAGE_BINDING >> 20
             )));
         }
         let (triangles, ends) = (buffer("triangles", 48 * room, storage), buffer("ends of triangles", 4 * room.max(4), storage));

@@ -4,8 +4,8 @@ use lobelia_frame::{
     GBuffer, ReflectiveShadowMap, SamplingDensity, SamplingDensityBindings, SamplingDensityLevels, SamplingDensityShape, SceneWorld,
 };
 use lobelia_graph::{
-    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, ParamValue, Params, Pass, PlanContext,
-    PortError, Ports, RunError, Specialisation, TraitsOf, WorkRate,
+    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, MAX_STORAGE_BINDING, Need, OutputShapes, ParamValue, Params,
+    Pass, PlanContext, PortError, Ports, RunError, Specialisation, TraitsOf, WorkRate,
 };
 use lobelia_shaders::Source;
 use serde::{Deserialize, Serialize};
@@ -148,9 +148,6 @@ pub struct Bindings {
     levels: SamplingDensityBindings,
 }
 
-/// Largest storage binding at the WebGPU baseline.
-const MAX_BINDING: u64 = 128 << 20;
-
 /// Cells a side of each face.
 fn cells(most: u32, shape: &SamplingDensityShape) -> u32 {
     most.next_power_of_two().min(shape.side()).max(8)
@@ -192,12 +189,12 @@ impl Pass for BrsmPass {
         }
         let shape = SamplingDensityShape { resolution: inputs.rsm.resolution, faces: inputs.rsm.faces };
         let cells = cells(context.params.cells, &shape);
-        if ratio_bytes(cells, shape.faces) > MAX_BINDING {
+        if ratio_bytes(cells, shape.faces) > MAX_STORAGE_BINDING {
             let message = format!(
                 "{} faces of {cells} x {cells} cells need {} MiB; at most {} MiB can be bound",
                 shape.faces,
                 ratio_bytes(cells, shape.faces) >> 20,
-                MAX_BINDING >> 20
+                MAX_STORAGE_BINDING >> 20
             );
             return Err(PortError::at("rsm", message).help("set fewer cells"));
         }

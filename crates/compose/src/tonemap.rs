@@ -12,6 +12,8 @@ use serde::{Deserialize, Serialize};
 pub struct TonemapPass {
     pipeline: ComputePipeline,
     settings: wgpu::Buffer,
+    /// 2 to the power of the parameter.
+    exposure: f32,
 }
 
 /// How radiance beyond what a screen shows is brought into its range.
@@ -49,6 +51,9 @@ impl Default for TonemapParams {
         Self { curve: Curve::Agx, exposure: 0.0 }
     }
 }
+
+/// Largest factor: the smallest half float is white with it, and the largest stays below 1e30.
+const MOST_FACTOR: f32 = 1e25;
 
 /// Input ports.
 #[derive(Ports)]
@@ -97,8 +102,7 @@ impl Pass for TonemapPass {
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        context.gpu.queue().write_buffer(&settings, 0, bytemuck::cast_slice(&[context.params.exposure.exp2(), 0.0, 0.0, 0.0]));
-        Ok(Self { pipeline, settings })
+        Ok(Self { pipeline, settings, exposure: context.params.exposure.exp2() })
     }
 
     fn bind(&self, context: &CreateContext<'_, Self>, inputs: &Inputs, outputs: &Outputs) -> Result<Bindings, BuildError> {
@@ -112,7 +116,10 @@ impl Pass for TonemapPass {
         Ok(Bindings { group, workgroups: self.pipeline.workgroups_2d(outputs.image.shape.extent) })
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>, _: &DeviceOf<Self>, bindings: &Bindings) -> Result<(), RunError> {
+    fn record(&mut self, frame: &mut Frame<'_>, world: &DeviceOf<Self>, bindings: &Bindings) -> Result<(), RunError> {
+        // Exposure is of radiance as the scene has it, not as it is stored.
+        let factor = (self.exposure / world.pre_exposure()).min(MOST_FACTOR);
+        frame.write_buffer(&self.settings, bytemuck::cast_slice(&[factor, 0.0, 0.0, 0.0]));
         frame.compute("tonemap", |pass| {
             pass.set_pipeline(self.pipeline.raw());
             pass.set_bind_group(0, &bindings.group, &[]);

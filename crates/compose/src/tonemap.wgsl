@@ -3,7 +3,7 @@
 #import lobelia::tonemap::{aces, agx, srgb_encode}
 
 struct Settings {
-    // 2^stops.
+    // 2^stops over the pre-exposure.
     exposure: f32,
     padding_a: f32,
     padding_b: f32,
@@ -19,7 +19,7 @@ fn tonemap(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= textureDimensions(picture)) {
         return;
     }
-    // At most 65504 * 2^32, far from overflow; the curves cut off what is whiter than white.
+    // The factor is held where this stays below 1e30; the curves cut off what is whiter than white.
     let exposed = textureLoad(radiance, id.xy, 0).rgb * settings.exposure;
 #if CURVE == 1
     let mapped = aces(exposed);

@@ -16,6 +16,7 @@
 
 mod area_light_visibility;
 mod axis;
+mod gathered_sums;
 mod gbuffer;
 mod light;
 mod patch_moments;
@@ -26,6 +27,7 @@ mod world;
 
 pub use area_light_visibility::{AreaLightVisibility, AreaLightVisibilityShape};
 pub use axis::Axis;
+pub use gathered_sums::GatheredSums;
 pub use gbuffer::{GBuffer, GBufferShape, SurfaceFlags, SurfaceFormats};
 pub use light::{LightVisibility, LightVisibilityShape, VirtualLight, VirtualLightLobes, VirtualLights, VirtualLightsShape};
 pub use lobelia_scene::{LightClass, LightTransport};

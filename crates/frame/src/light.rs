@@ -96,6 +96,7 @@ impl Resource for VirtualLights {
             mask: 0b0000_0111_0111_1111,
             non_negative: 0b0000_0000_0111_1000,
         });
+        let lights = lights.light(0b0000_0000_0111_0000);
         if !shape.lobes {
             return vec![lights];
         }
@@ -105,7 +106,8 @@ impl Resource for VirtualLights {
             if shape.specular { (0b0011_0111_0111_1111, 0b0011_0111_0111_1000) } else { (0b0000_0001_0111_1111, 0b0000_0001_0111_1000) };
         let values = Values::Records { stride: (bytes / 4) as u32, mask, non_negative };
         let bytes = bytes * u64::from(shape.count.max(1));
-        vec![lights, Part::buffer("lobes", bytes, BufferUsages::STORAGE).values(values)]
+        let flux = if shape.specular { 0b0000_0111_0111_0000 } else { 0b0000_0000_0111_0000 };
+        vec![lights, Part::buffer("lobes", bytes, BufferUsages::STORAGE).values(values).light(flux)]
     }
 
     fn assemble(shape: &VirtualLightsShape, parts: &PartSet) -> Self {
@@ -126,7 +128,7 @@ pub struct LightVisibilityShape {
 
 impl LightVisibilityShape {
     /// Most bytes that one buffer may have at the WebGPU baseline (storage binding size).
-    pub const CHUNK_BYTES: u64 = 128 << 20;
+    pub const CHUNK_BYTES: u64 = lobelia_graph::MAX_STORAGE_BINDING;
 
     /// Most lights that one pixel knows.
     pub fn lights_per_pixel(&self) -> u32 {

@@ -107,7 +107,8 @@ impl Resource for PatchMoments {
         let (mask, non_negative) =
             if shape.specular { (0b0011_0111_0111_1111, 0b0011_0111_0111_1000) } else { (0b0000_0001_0111_1111, 0b0000_0001_0111_1000) };
         let values = Values::Records { stride: (shape.record_bytes() / 4) as u32, mask, non_negative };
-        vec![Part::buffer("moments", shape.bytes(), BufferUsages::STORAGE).values(values)]
+        let flux = if shape.specular { 0b0000_0111_0111_0000 } else { 0b0000_0000_0111_0000 };
+        vec![Part::buffer("moments", shape.bytes(), BufferUsages::STORAGE).values(values).light(flux)]
     }
 
     fn assemble(shape: &PatchMomentsShape, parts: &PartSet) -> Self {

@@ -10,7 +10,9 @@ pub struct ImageShape {
 
 /// Radiance leaving the visible surface towards the camera, W/(sr m^2) per linear Rec. 709 channel; 0 where nothing is seen. Alpha is unused (1).
 ///
-/// Half floats: relative precision 2^-11, largest value 65504; producers clamp to it.
+/// Half floats: relative precision 2^-11, largest value 65504; producers clamp to it. On the device the radiance is multiplied by
+/// [`lobelia_scene::device::GpuScene::pre_exposure`], which is 1 for ordinary scenes and brings others into that range; what is read back through
+/// [`lobelia_graph::Runner::read`] is without it.
 #[derive(Clone, Debug)]
 pub struct Radiance {
     /// `rgba16float`, one texel per pixel, row 0 at the top.
@@ -31,7 +33,7 @@ impl Resource for Radiance {
 
     fn parts(shape: &ImageShape) -> Vec<Part> {
         let usage = TextureUsages::STORAGE_BINDING | TextureUsages::RENDER_ATTACHMENT;
-        vec![Part::texture("image", Self::FORMAT, shape.extent, usage).values(Values::NonNegative)]
+        vec![Part::texture("image", Self::FORMAT, shape.extent, usage).values(Values::NonNegative).light(0b0111)]
     }
 
     fn assemble(shape: &ImageShape, parts: &PartSet) -> Self {

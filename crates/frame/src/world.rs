@@ -13,4 +13,8 @@ impl World for SceneWorld {
     fn unspecialised(traits: &SceneTraits) -> SceneTraits {
         traits.unspecialised()
     }
+
+    fn pre_exposure(device: &GpuScene) -> f32 {
+        device.pre_exposure()
+    }
 }

@@ -4,7 +4,7 @@
 
 use crate::{
     error::{BuildError, GpuError},
-    gpu::Gpu,
+    gpu::{Gpu, MAX_STORAGE_BINDING, rows_within},
     pipeline::ComputePipeline,
     resource::{PartHandle, TextureShape, Values},
 };
@@ -21,6 +21,8 @@ pub struct Finding {
     pub non_finite: u64,
     /// Values below zero where that is wrong.
     pub negative: u64,
+    /// Half floats that stand at the largest, 65504: most likely cut off there.
+    pub saturated: u64,
 }
 
 /// Poisons and counts.
@@ -132,13 +134,16 @@ impl Checker {
                 let row = width * shape.format.block_copy_size(None).unwrap_or(4);
                 let pitch = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
                 let aspect = if shape.format.is_depth_stencil_format() { wgpu::TextureAspect::DepthOnly } else { wgpu::TextureAspect::All };
-                for layer in 0..shape.layers {
+                // Large pictures are counted in bands of rows that fit a binding.
+                let most = rows_within(MAX_STORAGE_BINDING, pitch);
+                for (layer, y) in (0..shape.layers).flat_map(|layer| (0..height).step_by(most as usize).map(move |y| (layer, y))) {
+                    let height = most.min(height - y);
                     let copy = self.scratch(gpu, u64::from(pitch) * u64::from(height));
                     encoder.copy_texture_to_buffer(
                         wgpu::TexelCopyTextureInfo {
                             texture: texture.texture(),
                             mip_level: 0,
-                            origin: wgpu::Origin3d { x: 0, y: 0, z: layer },
+                            origin: wgpu::Origin3d { x: 0, y, z: layer },
                             aspect,
                         },
                         wgpu::TexelCopyBufferInfo {
@@ -207,17 +212,26 @@ impl Checker {
         // Invocations stride over the words, so a fixed number of workgroups serves any size.
         compute.dispatch_workgroups(64, 1, 1);
         drop(compute);
-        self.open.push((Finding { pass: pass.into(), resource: resource.into(), non_finite: 0, negative: 0 }, counts));
+        self.open.push((Finding { pass: pass.into(), resource: resource.into(), non_finite: 0, negative: 0, saturated: 0 }, counts));
         Ok(())
     }
 
     /// After submission: the counts, in the order they were recorded.
     pub fn collect(&mut self, gpu: &Gpu) -> Result<Vec<Finding>, GpuError> {
-        let mut findings = Vec::new();
+        let mut findings: Vec<Finding> = Vec::new();
         for (finding, counts) in self.open.drain(..) {
             let bytes = gpu.read_buffer(&counts)?;
             let word = |index: usize| u64::from(u32::from_le_bytes([bytes[index], bytes[index + 1], bytes[index + 2], bytes[index + 3]]));
-            findings.push(Finding { non_finite: word(0), negative: word(4), ..finding });
+            let found = Finding { non_finite: word(0), negative: word(4), saturated: word(8), ..finding };
+            // Layers and bands of one texture are one finding.
+            match findings.last_mut() {
+                Some(last) if (&last.pass, &last.resource) == (&found.pass, &found.resource) => {
+                    last.non_finite += found.non_finite;
+                    last.negative += found.negative;
+                    last.saturated += found.saturated;
+                }
+                _ => findings.push(found),
+            }
         }
         Ok(findings)
     }

@@ -25,18 +25,21 @@ fn has(mask: vec2u, index: u32) -> bool {
     return ((select(mask.x, mask.y, index >= 32u) >> (index & 31u)) & 1u) == 1u;
 }
 
-fn count_one(non_finite: bool, negative: bool, index: u32) {
+fn count_one(non_finite: bool, negative: bool, saturated: bool, index: u32) {
     if has(settings.floats, index) {
         if non_finite {
             atomicAdd(&counts[0], 1u);
         } else if negative && has(settings.non_negative, index) {
             atomicAdd(&counts[1], 1u);
+        } else if saturated {
+            atomicAdd(&counts[2], 1u);
         }
     }
 }
 
 fn count_half(bits: u32, index: u32) {
-    count_one((bits & 0x7c00u) == 0x7c00u, bits > 0x8000u, index);
+    // 65504 of either sign, the largest half float: what is stored there was cut off.
+    count_one((bits & 0x7c00u) == 0x7c00u, bits > 0x8000u, (bits & 0x7fffu) == 0x7bffu, index);
 }
 
 @compute @workgroup_size(256)
@@ -50,7 +53,7 @@ fn count(@builtin(global_invocation_id) invocation: vec3u, @builtin(num_workgrou
             count_half(word & 0xffffu, 2u * index);
             count_half(word >> 16u, 2u * index + 1u);
         } else {
-            count_one((word & 0x7f800000u) == 0x7f800000u, word > 0x80000000u, index);
+            count_one((word & 0x7f800000u) == 0x7f800000u, word > 0x80000000u, false, index);
         }
     }
 }

@@ -10,6 +10,14 @@ use std::{
     time::Duration,
 };
 
+/// Most bytes that one storage binding of any WebGPU device sees; what is larger is cut into pieces or refused.
+pub const MAX_STORAGE_BINDING: u64 = 128 << 20;
+
+/// Whole rows of `pitch` bytes that fit `most` bytes, one at least.
+pub(crate) fn rows_within(most: u64, pitch: u32) -> u32 {
+    u32::try_from(most / u64::from(pitch.max(1))).unwrap_or(u32::MAX).max(1)
+}
+
 /// Which device is wanted.
 #[derive(Clone, Debug, Default)]
 pub struct GpuOptions {

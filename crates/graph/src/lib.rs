@@ -27,7 +27,7 @@ pub mod wire;
 
 pub use error::{BuildError, GpuError, PortError, RunError};
 pub use file::GraphFile;
-pub use gpu::{Gpu, GpuOptions};
+pub use gpu::{Gpu, GpuOptions, MAX_STORAGE_BINDING};
 pub use lobelia_graph_derive::{Params, Ports};
 pub use params::{NoParams, OrNone, ParamInfo, ParamProblem, ParamValue, Params};
 pub use pass::{ClaimOf, CreateContext, DeviceOf, InputShapes, Need, OutputShapes, Pass, PlanContext, Specialisation, TraitsOf, World};

@@ -24,6 +24,12 @@ pub trait World: Sized + 'static {
     /// The same facts with everything that permits leaving something out taken away. A plan made with these is the unpruned one, against which
     /// savings are measured and images compared.
     fn unspecialised(traits: &Self::Traits) -> Self::Traits;
+    /// What the world's light is multiplied by, so that radiance fits half floats; a power of two, and 1 unless the host says otherwise. Passes work in these
+    /// units and need not know; only what brings light out of the graph does (a tone curve, [`crate::Runner::read`]).
+    fn pre_exposure(device: &Self::Device) -> f32 {
+        let _ = device;
+        1.0
+    }
 }
 
 /// Facts of the world of pass `P`.

@@ -1,6 +1,9 @@
 //! Bringing textures and buffers back.
 
-use crate::{error::GpuError, gpu::Gpu};
+use crate::{
+    error::GpuError,
+    gpu::{Gpu, MAX_STORAGE_BINDING, rows_within},
+};
 use half::f16;
 
 /// Longest wait for an answer after the device's work is done.
@@ -44,6 +47,22 @@ impl TextureData {
         texels.collect()
     }
 
+    /// The channels of `light` divided by the power of two that they were stored times, as 32-bit floats. Formats without floats stay as they are.
+    pub(crate) fn without_pre_exposure(self, light: u64, pre_exposure: f32) -> Self {
+        let wide = match self.format {
+            _ if light == 0 || pre_exposure == 1.0 => return self,
+            wgpu::TextureFormat::R16Float | wgpu::TextureFormat::R32Float => wgpu::TextureFormat::R32Float,
+            wgpu::TextureFormat::Rg16Float | wgpu::TextureFormat::Rg32Float => wgpu::TextureFormat::Rg32Float,
+            wgpu::TextureFormat::Rgba16Float | wgpu::TextureFormat::Rgba32Float => wgpu::TextureFormat::Rgba32Float,
+            _ => return self,
+        };
+        let channels = usize::from(wide.components());
+        let stored = |channel: usize| if light >> channel & 1 == 1 { pre_exposure } else { 1.0 };
+        let texels = self.to_f32_rgba();
+        let values = texels.iter().flat_map(|texel| (0..channels).map(|channel| texel[channel] / stored(channel)));
+        Self { extent: self.extent, format: wide, bytes: values.flat_map(f32::to_le_bytes).collect() }
+    }
+
     /// The raw 32-bit words.
     pub fn to_u32(&self) -> Vec<u32> {
         self.bytes.chunks_exact(4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]])).collect()
@@ -68,19 +87,26 @@ impl Gpu {
         let [width, height] = [(texture.width() >> mip).max(1), (texture.height() >> mip).max(1)];
         let row = width * texel;
         let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let staging = self.staging(u64::from(padded) * u64::from(height));
-        let mut encoder = self.device().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("read back") });
-        encoder.copy_texture_to_buffer(
-            wgpu::TexelCopyTextureInfo { texture, mip_level: mip, origin: wgpu::Origin3d { x: 0, y: 0, z: layer }, aspect },
-            wgpu::TexelCopyBufferInfo {
-                buffer: &staging,
-                layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(padded), rows_per_image: Some(height) },
-            },
-            wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-        );
-        self.queue().submit([encoder.finish()]);
-        let padded_bytes = self.map(&staging)?;
-        let bytes = padded_bytes.chunks_exact(padded as usize).flat_map(|line| &line[..row as usize]).copied().collect();
+        let mut bytes = Vec::with_capacity(row as usize * height as usize);
+        // In bands of rows, since a buffer holds less than the largest texture.
+        let most = rows_within(MAX_STORAGE_BINDING, padded);
+        for y in (0..height).step_by(most as usize) {
+            let rows = most.min(height - y);
+            let staging = self.staging(u64::from(padded) * u64::from(rows));
+            let mut encoder = self.device().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("read back") });
+            encoder.copy_texture_to_buffer(
+                wgpu::TexelCopyTextureInfo { texture, mip_level: mip, origin: wgpu::Origin3d { x: 0, y, z: layer }, aspect },
+                wgpu::TexelCopyBufferInfo {
+                    buffer: &staging,
+                    layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(padded), rows_per_image: Some(rows) },
+                },
+                wgpu::Extent3d { width, height: rows, depth_or_array_layers: 1 },
+            );
+            self.queue().submit([encoder.finish()]);
+            for line in self.map(&staging)?.chunks_exact(padded as usize) {
+                bytes.extend_from_slice(&line[..row as usize]);
+            }
+        }
         Ok(TextureData { extent: [width, height], format, bytes })
     }
 

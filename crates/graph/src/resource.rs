@@ -33,6 +33,9 @@ pub struct Part {
     pub kind: PartKind,
     /// Which numbers may stand in it; the safety net counts what is not allowed.
     pub values: Values,
+    /// Which channels of a texel, or which 32-bit words of a record of [`Values::Records`], are in proportion to the scene's light: bit `i` for the `i`-th. They are
+    /// stored times [`crate::World::pre_exposure`]; whoever reads them back gets them without it.
+    pub light: u64,
 }
 
 impl Part {
@@ -54,12 +57,18 @@ impl Part {
             name,
             kind: PartKind::Texture(TextureShape { format, extent, layers, mips: 1, usage, array: layers > 1 }),
             values: Values::Any,
+            light: 0,
         }
     }
 
     /// A buffer of `bytes` (rounded up to a multiple of 16, at least 16).
     pub fn buffer(name: &'static str, bytes: u64, usage: wgpu::BufferUsages) -> Self {
-        Self { name, kind: PartKind::Buffer(BufferShape { bytes: bytes.max(1).next_multiple_of(16), usage }), values: Values::Any }
+        Self {
+            name,
+            kind: PartKind::Buffer(BufferShape { bytes: bytes.max(1).next_multiple_of(16), usage }),
+            values: Values::Any,
+            light: 0,
+        }
     }
 
     /// Makes the whole-texture view an array view even for a single layer.
@@ -81,6 +90,12 @@ impl Part {
     /// States which numbers the part may hold.
     pub fn values(mut self, values: Values) -> Self {
         self.values = values;
+        self
+    }
+
+    /// States which channels or words are in proportion to the scene's light; see [`Part::light`].
+    pub fn light(mut self, mask: u64) -> Self {
+        self.light = mask;
         self
     }
 

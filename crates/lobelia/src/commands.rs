@@ -67,8 +67,8 @@ impl SceneArguments {
 pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
     let sides = text.split_once(['x', 'X']).and_then(|(width, height)| Some([width.trim().parse().ok()?, height.trim().parse().ok()?]));
     match sides {
-        Some(sides) if sides.iter().all(|side| (1..=8192).contains(side)) => Ok(sides),
-        Some(_) => Err("each side must lie in [1, 8192] pixels".into()),
+        Some(sides) if sides.iter().all(|side| (1..=lobelia::MAX_SIDE).contains(side)) => Ok(sides),
+        Some(_) => Err(format!("each side must lie in [1, {}] pixels", lobelia::MAX_SIDE)),
         None => Err(format!("`{text}` is not of the form WIDTHxHEIGHT, such as 960x540")),
     }
 }

@@ -43,7 +43,7 @@ pub mod sweep;
 pub mod trial;
 pub mod truth;
 
-pub use session::{Picture, Rendering, Session, SessionError, SessionOptions, Shot, Step, frame_time};
+pub use session::{MAX_SIDE, Picture, Rendering, Session, SessionError, SessionOptions, Shot, Step, frame_time};
 
 use lobelia_frame::SceneWorld;
 use lobelia_graph::Registry;

@@ -37,6 +37,9 @@ impl SessionError {
     }
 }
 
+/// Most pixels along a side of a picture: WebGPU's default limit on textures.
+pub const MAX_SIDE: u32 = 8192;
+
 /// How a session is opened.
 #[derive(Clone, Debug, Default)]
 pub struct SessionOptions {
@@ -186,9 +189,9 @@ impl Session {
 
     /// Plans a graph for the scene and creates everything that it needs.
     pub fn start(&mut self, wired: &Wired<SceneWorld>, shot: &Shot) -> Result<Rendering<'_>, SessionError> {
-        if shot.extent.contains(&0) || shot.extent.iter().any(|side| *side > 8192) {
+        if shot.extent.contains(&0) || shot.extent.iter().any(|side| *side > MAX_SIDE) {
             return Err(SessionError::Argument(format!(
-                "a picture of {}x{} pixels cannot be made; each side must lie in [1, 8192]",
+                "a picture of {}x{} pixels cannot be made; each side must lie in [1, {MAX_SIDE}]",
                 shot.extent[0], shot.extent[1]
             )));
         }
@@ -289,6 +292,11 @@ impl Rendering<'_> {
     /// The device.
     pub fn gpu(&self) -> &Gpu {
         &self.session.gpu
+    }
+
+    /// What light is multiplied by on the device: [`GpuScene::pre_exposure`]. Everything that is read back here is without it.
+    pub fn pre_exposure(&self) -> f32 {
+        self.session.device.pre_exposure()
     }
 
     /// `pass.port` of the radiance that the graph ends in, or that its display image shows; `None` where it ends in something else.

@@ -340,8 +340,8 @@ impl Sweep {
             }
         }
         let sides = [sweep.size.0, sweep.size.1];
-        if sides.iter().any(|side| !(1..=8192).contains(side)) {
-            return refuse(format!("size {} x {}: each side must lie in [1, 8192] pixels", sides[0], sides[1]));
+        if sides.iter().any(|side| !(1..=crate::MAX_SIDE).contains(side)) {
+            return refuse(format!("size {} x {}: each side must lie in [1, {}] pixels", sides[0], sides[1], crate::MAX_SIDE));
         }
         if sweep.samples == 0 || sweep.rounds == 0 {
             return refuse("`samples` and `rounds` must be at least 1".into());

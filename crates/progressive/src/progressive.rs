@@ -2,8 +2,8 @@
 
 use lobelia_frame::{ImageShape, Radiance, SceneWorld};
 use lobelia_graph::{
-    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, OutputShapes, Params, Pass, PlanContext, PortError, Ports,
-    RunError,
+    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, MAX_STORAGE_BINDING, OutputShapes, Params, Pass, PlanContext,
+    PortError, Ports, RunError,
 };
 use lobelia_shaders::Source;
 use serde::{Deserialize, Serialize};
@@ -19,9 +19,6 @@ pub struct ProgressiveParams {
 
 /// As many half floats as 64 bits can add up.
 const MOST_FRAMES: u32 = 1 << 24;
-
-/// The most bytes that a storage binding of any WebGPU device sees.
-const BINDING: u64 = 128 << 20;
 
 /// Bytes of a pixel's sums.
 const PIXEL: u64 = 24;
@@ -67,7 +64,7 @@ pub struct Bindings {
 
 /// How many rows of a picture fit a binding, one at least.
 fn rows_of_part(extent: [u32; 2]) -> u32 {
-    let rows = BINDING / (PIXEL * u64::from(extent[0].max(1)));
+    let rows = MAX_STORAGE_BINDING / (PIXEL * u64::from(extent[0].max(1)));
     rows.clamp(1, u64::from(extent[1].max(1))) as u32
 }
 
@@ -143,14 +140,14 @@ impl Pass for ProgressivePass {
 
 #[cfg(test)]
 mod tests {
-    use super::{BINDING, PIXEL, rows_of_part};
+    use super::{MAX_STORAGE_BINDING, PIXEL, rows_of_part};
 
     #[test]
     fn every_part_fits_a_binding() {
         for extent in [[1, 1], [1920, 1080], [3840, 2160], [8192, 8192]] {
             let rows = rows_of_part(extent);
             assert!(rows >= 1 && rows <= extent[1]);
-            assert!(u64::from(rows) * u64::from(extent[0]) * PIXEL <= BINDING, "{extent:?}");
+            assert!(u64::from(rows) * u64::from(extent[0]) * PIXEL <= MAX_STORAGE_BINDING, "{extent:?}");
         }
         assert_eq!(rows_of_part([1920, 1080]), 1080);
         assert_eq!(rows_of_part([8192, 8192]), 682);

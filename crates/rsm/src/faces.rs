@@ -175,7 +175,16 @@ fn directional(light: &PunctualLight, centre: DVec3, radius: f64) -> View {
     let up = any_up(light.direction);
     let right = light.direction.cross(up).normalize() * radius * MARGIN;
     let up = right.cross(light.direction);
-    View { position, forward: light.direction, right, up, near: radius * 0.5, depth_range: radius * 3.0, weight: 1.0, hole: RsmFace::NO_HOLE }
+    View {
+        position,
+        forward: light.direction,
+        right,
+        up,
+        near: radius * 0.5,
+        depth_range: radius * 3.0,
+        weight: 1.0,
+        hole: RsmFace::NO_HOLE,
+    }
 }
 
 /// Faces that lie in each other around what is seen, the finest first and `whole` last. Each ends at the borders of texels of the next, so that every texel of

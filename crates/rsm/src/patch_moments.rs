@@ -2,8 +2,8 @@
 
 use lobelia_frame::{LobeLength, PatchMoments, PatchMomentsShape, ReflectiveShadowMap, SceneWorld};
 use lobelia_graph::{
-    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, Params, Pass, PlanContext, PortError,
-    Ports, RunError, Specialisation, TraitsOf,
+    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, MAX_STORAGE_BINDING, Need, OutputShapes, Params, Pass,
+    PlanContext, PortError, Ports, RunError, Specialisation, TraitsOf,
 };
 use lobelia_shaders::Source;
 use serde::{Deserialize, Serialize};
@@ -41,9 +41,6 @@ pub struct Outputs {
     pub moments: PatchMoments,
 }
 
-/// Largest storage binding at the WebGPU baseline.
-const MAX_BINDING: u64 = 128 << 20;
-
 impl Pass for PatchMomentsPass {
     const NAME: &'static str = "patch-moments";
     const DOC: &'static str = "Averages the patches of reflective shadow maps over blocks of 4 x 4, 8 x 8, ... texels.\n\
@@ -73,13 +70,13 @@ impl Pass for PatchMomentsPass {
             specular: rsm.flags.specular,
             lobe_length: context.params.lobe_length,
         };
-        if shape.bytes() > MAX_BINDING {
+        if shape.bytes() > MAX_STORAGE_BINDING {
             let message = format!(
                 "averages over {} faces of {} texels a side take {} MiB; at most {} MiB can be bound",
                 rsm.faces,
                 rsm.resolution,
                 shape.bytes() >> 20,
-                MAX_BINDING >> 20
+                MAX_STORAGE_BINDING >> 20
             );
             return Err(PortError::at("rsm", message).help("lower the resolution of the reflective shadow maps, or use fewer point lights"));
         }

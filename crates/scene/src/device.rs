@@ -53,7 +53,7 @@ pub struct GpuScene {
     pub instances: wgpu::Buffer,
     /// Layout of material bind groups: 0 uniform material; 1 to 4 textures base colour, metallic-roughness, normal, emission; 5 to 8 their samplers.
     pub material_layout: wgpu::BindGroupLayout,
-    /// Equirectangular environment radiance, scale included, `rgba16float`; one black texel without an environment.
+    /// Equirectangular environment radiance, scale and [`GpuScene::pre_exposure`] included, `rgba16float`; one black texel without an environment.
     pub environment: wgpu::TextureView,
     /// Facts.
     pub traits: SceneTraits,
@@ -66,6 +66,8 @@ pub struct GpuScene {
     /// The last view, without what does not move the camera, and how often it or the scene changed.
     seen: Cell<Option<ViewUniform>>,
     version: Cell<u64>,
+    pre_exposure: f32,
+    seen_size: f64,
 }
 
 const VERTEX_ATTRIBUTES: [wgpu::VertexAttribute; 4] =
@@ -96,13 +98,16 @@ impl GpuScene {
         let vertices = buffer("vertices", bytemuck::cast_slice(&vertex_data), wgpu::BufferUsages::VERTEX)?;
         let indices = buffer("indices", bytemuck::cast_slice(&index_data), wgpu::BufferUsages::INDEX)?;
         let view = buffer("view", &vec![0; ViewUniform::min_size().get() as usize], wgpu::BufferUsages::UNIFORM)?;
-        let lights = buffer("lights", &light_bytes(&scene), wgpu::BufferUsages::STORAGE)?;
-        let (area_lights, area_light_vertices) = area_light_bytes(&scene);
+        let seen = scene.seen_points();
+        let pre_exposure = scene.pre_exposure_for(&seen);
+        let seen_size = scene.size_of(seen);
+        let lights = buffer("lights", &light_bytes(&scene, pre_exposure), wgpu::BufferUsages::STORAGE)?;
+        let (area_lights, area_light_vertices) = area_light_bytes(&scene, pre_exposure);
         let area_lights = buffer("area lights", &area_lights, wgpu::BufferUsages::STORAGE)?;
         let area_light_vertices = buffer("corners of area lights", &area_light_vertices, wgpu::BufferUsages::STORAGE)?;
         let instances = buffer("instances", &instance_bytes(&scene), wgpu::BufferUsages::STORAGE)?;
         let material_layout = material_layout(device);
-        let materials = Materials::new(device, queue, &scene).bind_groups(device, queue, &material_layout, &scene);
+        let materials = Materials::new(device, queue, &scene).bind_groups(device, queue, &material_layout, &scene, pre_exposure);
         let mut draws: Vec<Draw> = scene
             .instances
             .iter()
@@ -123,7 +128,7 @@ impl GpuScene {
             area_light_count: scene.area_lights.len() as u32,
             instances,
             material_layout,
-            environment: environment_view(device, queue, &scene),
+            environment: environment_view(device, queue, &scene, pre_exposure),
             traits: scene.traits(),
             vertices,
             indices,
@@ -132,7 +137,20 @@ impl GpuScene {
             scene,
             seen: Cell::new(None),
             version: Cell::new(0),
+            pre_exposure,
+            seen_size,
         })
+    }
+
+    /// What radiance, flux and everything else in proportion to light is multiplied by on the device: a power of two, [`Scene::pre_exposure`] of the scene as
+    /// it was uploaded. It stays the same as long as this lives, animations included, so that histories keep their meaning.
+    pub fn pre_exposure(&self) -> f32 {
+        self.pre_exposure
+    }
+
+    /// [`Scene::seen_size`] of the scene as it was uploaded, metres: what lengths are small or large against.
+    pub fn seen_size(&self) -> f64 {
+        self.seen_size
     }
 
     /// How often scene or camera changed. What a pass has gathered over frames is of another picture if this is not what it was.
@@ -151,13 +169,13 @@ impl GpuScene {
         if self.seen.replace(Some(camera)) != Some(camera) {
             self.version.set(self.version.get() + 1);
         }
-        queue.write_buffer(&self.view, 0, &view_bytes(view));
+        queue.write_buffer(&self.view, 0, &view_bytes(&ViewUniform { pre_exposure: self.pre_exposure, ..*view }));
     }
 
     /// Takes over a scene that [`Scene::set_time`] moved: instances and lights are written anew. It must be the same scene otherwise.
     pub fn update(&mut self, queue: &wgpu::Queue, scene: Arc<Scene>) {
-        queue.write_buffer(&self.lights, 0, &light_bytes(&scene));
-        let (area_lights, area_light_vertices) = area_light_bytes(&scene);
+        queue.write_buffer(&self.lights, 0, &light_bytes(&scene, self.pre_exposure));
+        let (area_lights, area_light_vertices) = area_light_bytes(&scene, self.pre_exposure);
         queue.write_buffer(&self.area_lights, 0, &area_lights);
         queue.write_buffer(&self.area_light_vertices, 0, &area_light_vertices);
         queue.write_buffer(&self.instances, 0, &instance_bytes(&scene));

@@ -42,6 +42,7 @@ mod builtin;
 mod camera;
 pub mod device;
 mod error;
+mod exposure;
 mod files;
 mod gltf;
 mod light;
@@ -50,6 +51,7 @@ mod mesh;
 mod motion;
 mod ndf;
 mod nodes;
+mod seen;
 mod sight;
 mod tangents;
 mod traits;
@@ -283,9 +285,9 @@ impl Scene {
         camera.unwrap_or_else(|| unreachable!("the view is neither zero nor vertical"))
     }
 
-    /// Near plane where nobody gives one, metres: a thousandth of the scene's diagonal, at most 0.1 m.
+    /// Near plane where nobody gives one, metres: a thousandth of the scene's diagonal, at most 0.1 m, however small the scene is.
     pub(crate) fn usual_near(&self) -> f64 {
-        (2.0 * self.bounds().radius() * 1e-3).clamp(1e-4, 0.1)
+        (2.0 * self.bounds().radius() * 1e-3).clamp(1e-9, 0.1)
     }
 
     /// Bounds of all geometry in world space.

@@ -104,7 +104,7 @@ impl AreaShape {
 }
 
 /// Positive where the outline runs counter-clockwise as seen from local +Z.
-fn twice_signed_area(vertices: &[Vec2]) -> f64 {
+pub(crate) fn twice_signed_area(vertices: &[Vec2]) -> f64 {
     let edges = vertices.iter().zip(vertices.iter().cycle().skip(1));
     edges.map(|(from, to)| from.as_dvec2().perp_dot(to.as_dvec2())).sum()
 }

@@ -4,8 +4,8 @@ use crate::hierarchy::Hierarchy;
 use glam::{DMat3, DVec3};
 use lobelia_frame::{AreaLightVisibility, AreaLightVisibilityShape, GBuffer, SceneWorld};
 use lobelia_graph::{
-    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, Pass, PlanContext, PortError, Ports,
-    RunError, Specialisation, TraitsOf, WorkRate,
+    BuildError, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, MAX_STORAGE_BINDING, Need, OutputShapes, Pass, PlanContext,
+    PortError, Ports, RunError, Specialisation, TraitsOf, WorkRate,
 };
 use lobelia_lobes::sampling::{r2_point, sample_sphere};
 use lobelia_scene::{AreaLight, AreaShape, Scene, Triangle, triangulate};
@@ -169,7 +169,7 @@ impl Pass for AreaVisibilityPass {
             nodes.resize((4 * context.traits.triangles.max(1)).max(nodes.len()), [0; 4]);
         }
         let buffer = |label: &str, bytes: &[u8], usage: wgpu::BufferUsages| -> Result<wgpu::Buffer, BuildError> {
-            if bytes.len() as u64 > 128 << 20 {
+            if bytes.len() as u64 > MAX_STORAGE_BINDING {
                 return Err(BuildError::Other(format!(
                     "the {label} of the scene take {} MiB; at most 128 can be bound",
                     bytes.len() >> 20

@@ -106,9 +106,15 @@ impl Pass for VisibilityPass {
                 bytes >> 20,
                 MAX_BYTES >> 20
             );
-            return Err(
-                PortError::new(message).help("use fewer lights or a smaller picture, or raise `interleave` here and in the gathering pass")
-            );
+            let chunk_words = (LightVisibilityShape::CHUNK_BYTES / (4 * pixels)).max(1);
+            let words = (MAX_BYTES / (4 * pixels)).min(u64::from(LightVisibility::MAX_CHUNKS) * chunk_words);
+            let most = words * 32 * u64::from(shape.interleave).pow(2);
+            let help = if most > 0 {
+                format!("use at most {most} lights or a smaller picture, or raise `interleave` here and in the gathering pass")
+            } else {
+                "use a smaller picture".to_owned()
+            };
+            return Err(PortError::new(message).help(help));
         }
         Ok(OutputsShapes { visibility: shape })
     }

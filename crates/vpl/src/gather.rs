@@ -1,9 +1,9 @@
 //! The `vpl-gather` pass.
 
-use lobelia_frame::{GBuffer, ImageShape, LightClass, LightTransport, LightVisibility, Radiance, SceneWorld, VirtualLights};
+use lobelia_frame::{GBuffer, GatheredSums, ImageShape, LightClass, LightTransport, LightVisibility, Radiance, SceneWorld, VirtualLights};
 use lobelia_graph::{
-    BuildError, ClaimOf, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OrNone, OutputShapes, Params, Pass,
-    PlanContext, PortError, Ports, RunError, Specialisation, TraitsOf, WorkRate,
+    BuildError, ClaimOf, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OrNone, OutputShapes, ParamValue, Params,
+    Pass, PlanContext, PortError, Ports, RunError, Specialisation, TraitsOf, WorkRate,
 };
 use lobelia_shaders::Source;
 use serde::{Deserialize, Serialize};
@@ -13,7 +13,7 @@ pub struct VplGatherPass {
     gather: ComputePipeline,
     resolve: ComputePipeline,
     settings: wgpu::Buffer,
-    sums: wgpu::Buffer,
+    sums: GatheredSums,
     extent: [u32; 2],
     interleave: u32,
     words: u32,
@@ -24,11 +24,13 @@ pub struct VplGatherPass {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Params)]
 #[serde(default, deny_unknown_fields)]
 pub struct VplGatherParams {
-    /// Upper bound of the geometry term `cos cos / d^2` of each light, or `none`. A light nearer than `1/sqrt(clamp)` metres adds less than it
-    /// should: no bright spots, but dark corners. The term goes with one over length squared: 10 suits rooms of metres; a scene k times as large wants
-    /// `10 / k^2`. `none` is unbiased; a pixel upon a light stays finite all the same, since distances below 1e-5 of the scene's radius count as that.
-    #[param(unit = "1/m^2", range = 0.0..)]
+    /// Upper bound of the geometry term `cos cos / d^2` of each light, or `none`, in the unit that `clamp_unit` names. A light nearer than `1/sqrt(clamp)`
+    /// lengths adds less than it should: no bright spots, but dark corners. A scene that is k times as large looks the same. `none` is unbiased; a pixel upon a light stays finite all the same, since distances
+    /// below 1e-5 of the size of what is seen count as that.
+    #[param(range = 0.0..)]
     pub clamp: OrNone<f32>,
+    /// The length that `clamp` is one over the square of.
+    pub clamp_unit: ClampUnit,
     /// Side k of the blocks in which each pixel gathers one k^2-th of the lights. A joint tent filter 2k - 1 pixels wide, which stops at edges of normal and
     /// depth, then brings the lights of the block together; detail smaller than that is blurred. 1 gathers every light at every pixel.
     #[param(unit = "pixels", range = 1..=8)]
@@ -37,7 +39,29 @@ pub struct VplGatherParams {
 
 impl Default for VplGatherParams {
     fn default() -> Self {
-        Self { clamp: OrNone::Value(10.0), interleave: 1 }
+        Self { clamp: OrNone::Value(DEFAULT_CLAMP), clamp_unit: ClampUnit::Size, interleave: 1 }
+    }
+}
+
+/// Bound of the geometry term by default, over the square of the size of what is seen: 69 per square metre in the glossy box, 19 in a living room, 2.4 in an
+/// atrium, 40 million for things of a millimetre.
+const DEFAULT_CLAMP: f32 = 40.0;
+
+/// The length that the bound of the geometry term is told in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ClampUnit {
+    /// How large what the scene's cameras see is: half of the nearer half of it lies within one such length of its middle. A scene that is k times as large
+    /// looks the same.
+    #[default]
+    Size,
+    /// The metre.
+    Metre,
+}
+
+impl ParamValue for ClampUnit {
+    fn kind() -> String {
+        "size or metre".into()
     }
 }
 
@@ -74,17 +98,14 @@ pub struct Bindings {
     resolve_workgroups: [u32; 2],
 }
 
-/// Largest storage binding at the WebGPU baseline.
-const MAX_BINDING: u64 = 128 << 20;
-
-/// Least distance to a light, as a fraction of the scene's radius: keeps a pixel on a light finite with the clamp off.
+/// Least distance to a light, as a fraction of the size of what is seen: keeps a pixel on a light finite with the clamp off.
 const LEAST_DISTANCE: f64 = 1e-5;
 
 impl Pass for VplGatherPass {
     const NAME: &'static str = "vpl-gather";
     const DOC: &'static str = "Gathers virtual point lights at every pixel: one bounce of indirect light.\n\
         Keller 1997. The full glTF reflectance at both ends; an unbiased estimate of light that scatters exactly twice when `clamp` is none. \
-        Distances below 1e-5 of the scene's radius count as that.";
+        Distances below 1e-5 of the size of what is seen count as that.";
     type World = SceneWorld;
     type Params = VplGatherParams;
     type Inputs = Inputs;
@@ -115,17 +136,6 @@ impl Pass for VplGatherPass {
 
     fn shape(context: &PlanContext<'_, Self>, inputs: &InputShapes<Self>) -> Result<OutputShapes<Self>, PortError> {
         let extent = inputs.gbuffer.extent;
-        let pixels = u64::from(extent[0]) * u64::from(extent[1]);
-        if pixels * 16 > MAX_BINDING {
-            let message = format!(
-                "a picture of {} x {} pixels needs {} MiB for its sums; at most {} MiB can be bound",
-                extent[0],
-                extent[1],
-                (pixels * 16) >> 20,
-                MAX_BINDING >> 20
-            );
-            return Err(PortError::at("gbuffer", message).help("render a smaller picture"));
-        }
         if let Some(visibility) = &inputs.visibility {
             visibility.check_gathering(extent, inputs.lights.count, context.params.interleave)?;
         }
@@ -147,12 +157,17 @@ impl Pass for VplGatherPass {
         let count = context.inputs.lights.count;
         let settings = buffer("gather settings", 32, wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST);
         let visibility_interleaved = context.inputs.visibility.is_some_and(|visibility| visibility.interleave == interleave);
-        let least = (LEAST_DISTANCE * context.traits.bounds.radius()).powi(2).clamp(1e-20, 1e20) as f32;
+        let least = (LEAST_DISTANCE * context.world.seen_size()).powi(2).clamp(1e-20, 1e20) as f32;
         // The largest float stands for "no bound".
-        let clamp = context.params.clamp.value().unwrap_or(f32::MAX);
+        let per_square_metre = match context.params.clamp_unit {
+            ClampUnit::Size => context.world.seen_size().powi(-2),
+            ClampUnit::Metre => 1.0,
+        };
+        let bound = |clamp: f32| (f64::from(clamp) * per_square_metre).min(f64::from(f32::MAX)) as f32;
+        let clamp = context.params.clamp.value().map_or(f32::MAX, bound);
         let words = [count, interleave, u32::from(visibility_interleaved), clamp.to_bits(), least.to_bits(), 0, 0, 0];
         context.gpu.queue().write_buffer(&settings, 0, bytemuck::cast_slice(&words));
-        let sums = buffer("gathered sums", u64::from(extent[0]) * u64::from(extent[1]) * 16, wgpu::BufferUsages::STORAGE);
+        let sums = GatheredSums::new(context.gpu, extent);
         Ok(Self {
             gather: pipeline("gather")?,
             resolve: pipeline("resolve")?,
@@ -179,7 +194,12 @@ impl Pass for VplGatherPass {
                 .texture_if("gbuffer_specular", gbuffer.specular.as_ref())
                 .texture_if("gbuffer_geometric_normal", gbuffer.geometric_normal.as_ref())
                 .buffer_if("visibility", visibility)
-                .raw_buffer("sums", &self.sums)
+                .view("red", &self.sums.red)
+                .view("green", &self.sums.green)
+                .view("blue", &self.sums.blue)
+                .view("gathered_red", &self.sums.red)
+                .view("gathered_green", &self.sums.green)
+                .view("gathered_blue", &self.sums.blue)
                 .texture("radiance", &outputs.radiance.image)
                 .build(context.gpu)
         };

@@ -1,6 +1,6 @@
 //! The `vsgl-gather` pass.
 
-use lobelia_frame::{GBuffer, ImageShape, LightClass, LightTransport, LightVisibility, Radiance, SceneWorld, VirtualLights};
+use lobelia_frame::{GBuffer, GatheredSums, ImageShape, LightClass, LightTransport, LightVisibility, Radiance, SceneWorld, VirtualLights};
 use lobelia_graph::{
     BuildError, ClaimOf, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OrNone, OutputShapes, ParamValue, Params,
     Pass, PlanContext, PortError, Ports, RunError, Specialisation, TraitsOf, WorkRate,
@@ -13,7 +13,7 @@ pub struct VsglGatherPass {
     gather: ComputePipeline,
     resolve: ComputePipeline,
     settings: wgpu::Buffer,
-    sums: wgpu::Buffer,
+    sums: GatheredSums,
     extent: [u32; 2],
     interleave: u32,
     words: u32,
@@ -117,10 +117,7 @@ pub struct Bindings {
     resolve_workgroups: [u32; 2],
 }
 
-/// Largest storage binding at the WebGPU baseline.
-const MAX_BINDING: u64 = 128 << 20;
-
-/// Least distance to a light, as a fraction of the scene's radius: keeps a pixel on a light finite with the clamp off.
+/// Least distance to a light, as a fraction of the size of what is seen: keeps a pixel on a light finite with the clamp off.
 const LEAST_DISTANCE: f64 = 1e-5;
 
 impl Pass for VsglGatherPass {
@@ -182,17 +179,6 @@ impl Pass for VsglGatherPass {
 
     fn shape(context: &PlanContext<'_, Self>, inputs: &InputShapes<Self>) -> Result<OutputShapes<Self>, PortError> {
         let extent = inputs.gbuffer.extent;
-        let pixels = u64::from(extent[0]) * u64::from(extent[1]);
-        if pixels * 16 > MAX_BINDING {
-            let message = format!(
-                "a picture of {} x {} pixels needs {} MiB for its sums; at most {} MiB can be bound",
-                extent[0],
-                extent[1],
-                (pixels * 16) >> 20,
-                MAX_BINDING >> 20
-            );
-            return Err(PortError::at("gbuffer", message).help("render a smaller picture"));
-        }
         if let Some(visibility) = &inputs.visibility {
             visibility.check_gathering(extent, inputs.lights.count, context.params.interleave)?;
         }
@@ -214,11 +200,11 @@ impl Pass for VsglGatherPass {
         let count = context.inputs.lights.count;
         let settings = buffer("gather settings", 32, wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST);
         let visibility_interleaved = context.inputs.visibility.is_some_and(|visibility| visibility.interleave == interleave);
-        let least = (LEAST_DISTANCE * context.traits.bounds.radius()).powi(2).clamp(1e-20, 1e20) as f32;
+        let least = (LEAST_DISTANCE * context.world.seen_size()).powi(2).clamp(1e-20, 1e20) as f32;
         let threshold = context.params.bias_reduction.value().unwrap_or(0.0);
         let words = [count, interleave, u32::from(visibility_interleaved), threshold.to_bits(), least.to_bits(), 0, 0, 0];
         context.gpu.queue().write_buffer(&settings, 0, bytemuck::cast_slice(&words));
-        let sums = buffer("gathered sums", u64::from(extent[0]) * u64::from(extent[1]) * 16, wgpu::BufferUsages::STORAGE);
+        let sums = GatheredSums::new(context.gpu, extent);
         Ok(Self {
             gather: pipeline("gather")?,
             resolve: pipeline("resolve")?,
@@ -246,7 +232,12 @@ impl Pass for VsglGatherPass {
                 .texture_if("gbuffer_specular", gbuffer.specular.as_ref())
                 .texture_if("gbuffer_geometric_normal", gbuffer.geometric_normal.as_ref())
                 .buffer_if("visibility", visibility)
-                .raw_buffer("sums", &self.sums)
+                .view("red", &self.sums.red)
+                .view("green", &self.sums.green)
+                .view("blue", &self.sums.blue)
+                .view("gathered_red", &self.sums.red)
+                .view("gathered_green", &self.sums.green)
+                .view("gathered_blue", &self.sums.blue)
                 .texture("radiance", &outputs.radiance.image)
                 .build(context.gpu)
         };

@@ -1,6 +1,6 @@
 //! The `vsl-gather` pass.
 
-use lobelia_frame::{GBuffer, ImageShape, LightClass, LightTransport, LightVisibility, Radiance, SceneWorld, VirtualLights};
+use lobelia_frame::{GBuffer, GatheredSums, ImageShape, LightClass, LightTransport, LightVisibility, Radiance, SceneWorld, VirtualLights};
 use lobelia_graph::{
     BuildError, ClaimOf, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, ParamValue, Params, Pass,
     PlanContext, PortError, Ports, RunError, Specialisation, TraitsOf, WorkRate,
@@ -14,7 +14,7 @@ pub struct VslGatherPass {
     gather: ComputePipeline,
     resolve: ComputePipeline,
     settings: wgpu::Buffer,
-    sums: wgpu::Buffer,
+    sums: GatheredSums,
     radii: wgpu::Buffer,
     fixed: [u32; 9],
     extent: [u32; 2],
@@ -104,10 +104,7 @@ pub struct Bindings {
     resolve_workgroups: [u32; 2],
 }
 
-/// Largest storage binding at the WebGPU baseline.
-const MAX_BINDING: u64 = 128 << 20;
-
-/// Least distance to a light, as a fraction of the scene's radius: keeps a pixel on a light finite with the clamp off.
+/// Least distance to a light, as a fraction of the size of what is seen: keeps a pixel on a light finite with the clamp off.
 const LEAST_DISTANCE: f64 = 1e-5;
 
 impl Pass for VslGatherPass {
@@ -145,17 +142,6 @@ impl Pass for VslGatherPass {
 
     fn shape(context: &PlanContext<'_, Self>, inputs: &InputShapes<Self>) -> Result<OutputShapes<Self>, PortError> {
         let extent = inputs.gbuffer.extent;
-        let pixels = u64::from(extent[0]) * u64::from(extent[1]);
-        if pixels * 16 > MAX_BINDING {
-            let message = format!(
-                "a picture of {} x {} pixels needs {} MiB for its sums; at most {} MiB can be bound",
-                extent[0],
-                extent[1],
-                (pixels * 16) >> 20,
-                MAX_BINDING >> 20
-            );
-            return Err(PortError::at("gbuffer", message).help("render a smaller picture"));
-        }
         if let Some(visibility) = &inputs.visibility {
             visibility.check_gathering(extent, inputs.lights.count, context.params.interleave)?;
         }
@@ -177,7 +163,7 @@ impl Pass for VslGatherPass {
         let count = context.inputs.lights.count;
         let settings = buffer("gather settings", 48, wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST);
         let visibility_interleaved = context.inputs.visibility.is_some_and(|visibility| visibility.interleave == interleave);
-        let least = (LEAST_DISTANCE * context.traits.bounds.radius()).powi(2).clamp(1e-20, 1e20) as f32;
+        let least = (LEAST_DISTANCE * context.world.seen_size()).powi(2).clamp(1e-20, 1e20) as f32;
         let params = context.params;
         let given = u32::from(params.radius == RadiusSource::Given);
         let interleaved = u32::from(visibility_interleaved);
@@ -192,7 +178,7 @@ impl Pass for VslGatherPass {
             given,
             params.seed,
         ];
-        let sums = buffer("gathered sums", u64::from(extent[0]) * u64::from(extent[1]) * 16, wgpu::BufferUsages::STORAGE);
+        let sums = GatheredSums::new(context.gpu, extent);
         let nearest = Source { path: "crates/vsl/src/radii.wgsl", text: include_str!("radii.wgsl") };
         Ok(Self {
             nearest: context.gpu.compute_pipeline(context.name, nearest, "nearest", context.flags)?,
@@ -224,7 +210,12 @@ impl Pass for VslGatherPass {
                 .texture_if("gbuffer_specular", gbuffer.specular.as_ref())
                 .texture_if("gbuffer_geometric_normal", gbuffer.geometric_normal.as_ref())
                 .buffer_if("visibility", visibility)
-                .raw_buffer("sums", &self.sums)
+                .view("red", &self.sums.red)
+                .view("green", &self.sums.green)
+                .view("blue", &self.sums.blue)
+                .view("gathered_red", &self.sums.red)
+                .view("gathered_green", &self.sums.green)
+                .view("gathered_blue", &self.sums.blue)
                 .raw_buffer("radii", &self.radii)
                 .texture("radiance", &outputs.radiance.image)
                 .build(context.gpu)

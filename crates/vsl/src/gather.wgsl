@@ -58,7 +58,13 @@ struct Range {
 #ifdef VISIBILITY
 @group(0) @binding(8) var<storage, read> visibility: array<u32>;
 #endif
-@group(0) @binding(9) var<storage, read_write> sums: array<vec4f>;
+// Sums so far, as `gather` changes them and as `resolve` reads them.
+@group(0) @binding(9) var red: texture_storage_2d<r32float, read_write>;
+@group(0) @binding(20) var green: texture_storage_2d<r32float, read_write>;
+@group(0) @binding(21) var blue: texture_storage_2d<r32float, read_write>;
+@group(0) @binding(22) var gathered_red: texture_2d<f32>;
+@group(0) @binding(23) var gathered_green: texture_2d<f32>;
+@group(0) @binding(24) var gathered_blue: texture_2d<f32>;
 @group(0) @binding(10) var radiance: texture_storage_2d<rgba16float, write>;
 @group(0) @binding(11) var<storage, read> radii: array<f32>;
 
@@ -231,10 +237,21 @@ fn gather(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_in
         }
     }
     if place.inside {
-        let address = place.pixel.y * extent.x + place.pixel.x;
-        let before = select(sums[address].xyz, vec3f(0.0), range.first == 1u);
-        sums[address] = vec4f(min(before + total, vec3f(1e30)), depth);
+        var sum = min(total, vec3f(1e30));
+        if range.first == 0u {
+            let before = vec3f(textureLoad(red, place.pixel).x, textureLoad(green, place.pixel).x, textureLoad(blue, place.pixel).x);
+            sum = min(before + total, vec3f(1e30));
+        }
+        textureStore(red, place.pixel, vec4f(sum.x));
+        textureStore(green, place.pixel, vec4f(sum.y));
+        textureStore(blue, place.pixel, vec4f(sum.z));
     }
+}
+
+// The sum at a pixel, and its depth.
+fn gathered(pixel: vec2u) -> vec4f {
+    let sum = vec3f(textureLoad(gathered_red, pixel, 0).x, textureLoad(gathered_green, pixel, 0).x, textureLoad(gathered_blue, pixel, 0).x);
+    return vec4f(sum, textureLoad(gbuffer_depth, pixel, 0));
 }
 
 // Radiance of a pixel: its own sum, or with interleaving the sum over all subsets of the lights by the tent filter of lobelia::interleaving.
@@ -244,7 +261,7 @@ fn resolve(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= extent) {
         return;
     }
-    let own = sums[id.y * extent.x + id.x];
+    let own = gathered(id.xy);
     var result = own.xyz;
 #ifdef INTERLEAVED
     if own.w > 0.0 {
@@ -262,7 +279,7 @@ fn resolve(@builtin(global_invocation_id) id: vec3u) {
                 if tap.weight <= 0.0 || any(other < vec2i(0)) || any(other >= vec2i(extent)) {
                     continue;
                 }
-                let known = sums[u32(other.y) * extent.x + u32(other.x)];
+                let known = gathered(vec2u(other));
                 if known.w <= 0.0 {
                     continue;
                 }

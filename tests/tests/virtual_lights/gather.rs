@@ -172,7 +172,7 @@ impl Case {
                 "surfaces": given_gbuffer(specular: {}, normal_map: {}),
                 "lights": given_lights(count: {count}),
                 {visibility}
-                "indirect": vpl_gather(clamp: {clamp}, interleave: {}),
+                "indirect": vpl_gather(clamp: {clamp}, clamp_unit: metre, interleave: {}),
             }}, output: "indirect.radiance")"#,
             self.specular, self.normal_map, self.interleave
         );

@@ -1,7 +1,7 @@
 //! Owns every resource of a plan and runs it.
 
 use crate::{
-    check::Checker,
+    check::{Checker, Finding},
     error::{GpuError, RunError},
     gpu::Gpu,
     pass::World,
@@ -58,6 +58,8 @@ pub struct FrameReport {
     pub passes: Vec<PassTime>,
     /// Device spans with [`Timing::Timestamps`].
     pub spans: Option<FrameTimes>,
+    /// With [`RunOptions::check`]: parts that hold half floats at 65504, where what is larger is cut off. Light is lost there, but nothing is broken.
+    pub saturated: Vec<Finding>,
     /// Start and length of each pass's recording on the CPU, milliseconds since the frame began.
     pub cpu_spans: Vec<(String, f64, f64)>,
 }
@@ -87,6 +89,8 @@ pub struct Runner<W: World> {
     age: u64,
     timer: Timer,
     checker: Option<Checker>,
+    /// That of the last frame's world.
+    pre_exposure: f32,
 }
 
 impl<W: World> Runner<W> {
@@ -105,6 +109,7 @@ impl<W: World> Runner<W> {
             age: 0,
             timer: Timer::new(gpu, options.timing == Timing::Timestamps),
             checker: options.check.then(|| Checker::new(gpu)).transpose().map_err(safety_net)?,
+            pre_exposure: W::pre_exposure(world),
         };
         runner.passes = runner.create_passes(gpu, world)?;
         gpu.take_error()?;
@@ -220,6 +225,7 @@ impl<W: World> Runner<W> {
     /// Runs one frame. `progress` hears of long work and may stop it by returning `false`.
     pub fn run(&mut self, gpu: &Gpu, world: &W::Device, seed: u32, progress: &mut Progress<'_>) -> Result<FrameReport, RunError> {
         let side = (self.frame % 2) as usize % self.sides;
+        self.pre_exposure = W::pre_exposure(world);
         let info = FrameInfo { index: self.frame, seed };
         let mut encoder = gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("lobelia frame") });
         if self.age == 0 && self.sides == 2 {
@@ -289,6 +295,7 @@ impl<W: World> Runner<W> {
                     negative: first.negative,
                 });
             }
+            report.saturated = findings.into_iter().filter(|finding| finding.saturated > 0).collect();
         }
         if self.options.timing == Timing::Timestamps {
             gpu.wait()?;
@@ -329,7 +336,8 @@ impl<W: World> Runner<W> {
         Ok((resource, self.parts(resource, side, Access::Read)))
     }
 
-    /// A kept resource as its own type, to use its views in another wgpu program.
+    /// A kept resource as its own type, to use its views in another wgpu program. What is in proportion to light is stored times
+    /// [`World::pre_exposure`].
     pub fn resource<R: Resource>(&self, name: &str) -> Result<R, RunError> {
         let (resource, parts) = self.kept_parts(name)?;
         let shape = resource.shape.as_ref().as_any().downcast_ref::<R::Shape>();
@@ -339,7 +347,8 @@ impl<W: World> Runner<W> {
         Ok(R::assemble(shape, &parts))
     }
 
-    /// Reads all parts of a kept resource back: name, description, and data.
+    /// Reads all parts of a kept resource back: name, description, and data. What [`Part::light`] names is divided by [`World::pre_exposure`]; half floats
+    /// come as 32-bit floats where that is not 1.
     pub fn read(&self, gpu: &Gpu, name: &str) -> Result<Vec<(Part, PartData)>, RunError> {
         let (resource, parts) = self.kept_parts(name)?;
         let mut read = Vec::new();
@@ -347,24 +356,33 @@ impl<W: World> Runner<W> {
             let data = match handle {
                 PartHandle::Texture(texture) => {
                     let layers = (0..texture.shape().layers).map(|layer| gpu.read_texture(texture.texture(), 0, layer));
+                    let layers = layers.map(|layer| layer.map(|data| data.without_pre_exposure(part.light, self.pre_exposure)));
                     PartData::Texture(layers.collect::<Result<_, GpuError>>()?)
                 }
-                PartHandle::Buffer(buffer) => PartData::Buffer(gpu.read_buffer(buffer.buffer())?),
+                PartHandle::Buffer(buffer) => {
+                    let mut bytes = gpu.read_buffer(buffer.buffer())?;
+                    remove_pre_exposure(&mut bytes, part, self.pre_exposure);
+                    PartData::Buffer(bytes)
+                }
             };
             read.push((part.clone(), data));
         }
         Ok(read)
     }
 
-    /// Overwrites the first image part of a kept resource with linear RGB (alpha 1), row 0 at the top; formats `rgba16float` and `rgba32float`.
+    /// Overwrites the first image part of a kept resource with linear RGB (alpha 1), row 0 at the top; formats `rgba16float` and `rgba32float`. Units are those
+    /// of [`Runner::read`].
     pub fn write_image(&self, gpu: &Gpu, name: &str, pixels: &[[f32; 3]]) -> Result<(), RunError> {
-        let (_, parts) = self.kept_parts(name)?;
+        let (resource, parts) = self.kept_parts(name)?;
         let refuse = |message: &str| RunError::Pass { pass: name.into(), message: message.into() };
-        let texture = parts.iter().find_map(|(_, handle)| match handle {
-            PartHandle::Texture(texture) => Some(texture.clone()),
+        let texture = resource.parts.iter().zip(parts.iter()).find_map(|(part, (_, handle))| match handle {
+            PartHandle::Texture(texture) => Some((part, texture.clone())),
             PartHandle::Buffer(_) => None,
         });
-        let texture = texture.ok_or_else(|| refuse("it has no image"))?;
+        let (part, texture) = texture.ok_or_else(|| refuse("it has no image"))?;
+        let stored = |channel: usize| if part.light >> channel & 1 == 1 { self.pre_exposure } else { 1.0 };
+        let factors = [stored(0), stored(1), stored(2)];
+        let texels = pixels.iter().flat_map(|[r, g, b]| [*r * factors[0], *g * factors[1], *b * factors[2], 1.0]);
         let [width, height] = texture.shape().extent;
         if pixels.len() != width as usize * height as usize {
             return Err(refuse("the image has another size"));
@@ -372,11 +390,9 @@ impl<W: World> Runner<W> {
         let (bytes, texel): (Vec<u8>, u32) = match texture.shape().format {
             wgpu::TextureFormat::Rgba16Float => {
                 let half = |value: f32| half::f16::from_f32(value.clamp(-65504.0, 65504.0)).to_le_bytes();
-                (pixels.iter().flat_map(|[r, g, b]| [*r, *g, *b, 1.0]).flat_map(half).collect(), 8)
+                (texels.flat_map(half).collect(), 8)
             }
-            wgpu::TextureFormat::Rgba32Float => {
-                (pixels.iter().flat_map(|[r, g, b]| [*r, *g, *b, 1.0]).flat_map(f32::to_le_bytes).collect(), 16)
-            }
+            wgpu::TextureFormat::Rgba32Float => (texels.flat_map(f32::to_le_bytes).collect(), 16),
             _ => return Err(refuse("its format cannot be written")),
         };
         let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
@@ -430,6 +446,20 @@ pub enum PartData {
     Texture(Vec<TextureData>),
     /// Raw bytes.
     Buffer(Vec<u8>),
+}
+
+/// Divides the words of a buffer of records that are in proportion to light.
+fn remove_pre_exposure(bytes: &mut [u8], part: &Part, pre_exposure: f32) {
+    let Values::Records { stride, .. } = part.values else { return };
+    if part.light == 0 || pre_exposure == 1.0 {
+        return;
+    }
+    for (index, word) in bytes.chunks_exact_mut(4).enumerate() {
+        if part.light >> (index % stride as usize) & 1 == 1 {
+            let value = f32::from_le_bytes([word[0], word[1], word[2], word[3]]) / pre_exposure;
+            word.copy_from_slice(&value.to_le_bytes());
+        }
+    }
 }
 
 fn safety_net(error: crate::error::BuildError) -> RunError {

@@ -127,7 +127,7 @@ pub struct ShotArguments {
     /// Camera of the scene; its first if none is named.
     #[arg(long, value_name = "NAME")]
     pub camera: Option<String>,
-    /// Size of the pictures in pixels.
+    /// Size of the pictures in pixels, each side at most 8192.
     #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "480x270")]
     pub size: [u32; 2],
     /// Average this many sub-pixel-jittered frames in linear radiance; edges need 16 to be compared with a reference.
@@ -171,7 +171,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     arguments.sequence.check(&arguments.truth)?;
     make_folder(&arguments.report)?;
     let registry = lobelia::registry();
-    let trial::Techniques { mut techniques, warnings } = trial::techniques(&arguments.techniques, &arguments.overrides, &registry)?;
+    let trial::Techniques { mut techniques, mut warnings } = trial::techniques(&arguments.techniques, &arguments.overrides, &registry)?;
     name_apart(&mut techniques);
     let scene = Session::load(&arguments.scene.scene, &arguments.scene.options())?;
     // Everything that can be wrong with the input is found before the long work.

@@ -14,7 +14,7 @@ pub struct Arguments {
     graph: GraphArguments,
     #[command(flatten)]
     scene: SceneArguments,
-    /// Size of the picture in pixels.
+    /// Size of the picture in pixels, each side at most 8192.
     #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "960x540")]
     size: [u32; 2],
     /// Keep a further resource, as `render --save` does.

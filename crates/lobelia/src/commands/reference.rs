@@ -53,7 +53,7 @@ pub struct Arguments {
     /// Camera of the scene; its first if none is named.
     #[arg(long, value_name = "NAME")]
     camera: Option<String>,
-    /// Size of the picture in pixels.
+    /// Size of the picture in pixels, each side at most 8192.
     #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "960x540")]
     size: [u32; 2],
     /// Chooses the noise; equal seeds give equal pictures on any number of threads.

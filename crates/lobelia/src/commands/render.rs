@@ -34,7 +34,7 @@ pub struct Arguments {
     /// Picture to write: .png (the graph's output as it is displayed) or .exr (linear RGB before tone mapping).
     #[arg(short, long, value_name = "FILE", required_unless_present = "saves")]
     output: Option<PathBuf>,
-    /// Size of the picture in pixels.
+    /// Size of the picture in pixels, each side at most 8192.
     #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "960x540")]
     size: [u32; 2],
     /// Camera of the scene; its first if none is named.
@@ -68,7 +68,8 @@ pub struct Arguments {
     /// Do not specialise shaders and resources to the scene: the yardstick for what specialising saves.
     #[arg(long)]
     no_specialise: bool,
-    /// Poison resources and count non-finite and negative values after every pass; the first offender is named. Slow.
+    /// Poison resources and count non-finite and negative values after every pass; the first offender is named. Half floats at their largest, where brighter
+    /// light is cut off, are counted with a warning. Slow.
     #[arg(long)]
     check: bool,
     /// Print nothing but errors.
@@ -139,7 +140,32 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.profile {
         write_profile(path, rendering.reports())?;
     }
+    warn_saturated(arguments, &rendering);
     report(arguments, &rendering, timing)
+}
+
+/// Half floats at 65504 in any frame: resource, values in the frame with the most, and the radiance that this stands for.
+fn saturated(rendering: &Rendering<'_>) -> Vec<(String, u64, f64)> {
+    let most = 65504.0 / f64::from(rendering.pre_exposure());
+    let mut found: Vec<(String, u64, f64)> = Vec::new();
+    for finding in rendering.reports().iter().flat_map(|report| &report.saturated) {
+        match found.iter_mut().find(|(resource, ..)| *resource == finding.resource) {
+            Some((_, count, _)) => *count = (*count).max(finding.saturated),
+            None => found.push((finding.resource.clone(), finding.saturated, most)),
+        }
+    }
+    found
+}
+
+fn warn_saturated(arguments: &Arguments, rendering: &Rendering<'_>) {
+    if arguments.quiet {
+        return;
+    }
+    for (resource, count, most) in saturated(rendering) {
+        eprintln!(
+            "warning: {count} value(s) of `{resource}` stand at {most:.4e}, the most that it can hold here: brighter light is cut off"
+        );
+    }
 }
 
 /// Refuses what could not be written, before any work.
@@ -301,6 +327,10 @@ fn report(arguments: &Arguments, rendering: &Rendering<'_>, timing: Timing) -> R
                 })
             })
             .collect();
+        let saturated: Vec<_> = saturated(rendering)
+            .into_iter()
+            .map(|(resource, count, most)| serde_json::json!({"resource": resource, "values": count, "most": most}))
+            .collect();
         let dropped: Vec<_> = plan
             .dropped
             .iter()
@@ -309,7 +339,7 @@ fn report(arguments: &Arguments, rendering: &Rendering<'_>, timing: Timing) -> R
         let value = serde_json::json!({
             "graph": arguments.graph.graph, "scene": arguments.scene.scene, "variants": arguments.graph.variants, "device": adapter,
             "size": arguments.size, "samples": arguments.samples, "frames": arguments.frames, "seed": arguments.seed, "timing": how,
-            "passes": passes, "dropped": dropped, "mebibytes": plan.bytes() as f64 / (1u64 << 20) as f64, "written": written,
+            "passes": passes, "saturated": saturated, "dropped": dropped, "mebibytes": plan.bytes() as f64 / (1u64 << 20) as f64, "written": written,
         });
         writeln!(out, "{value:#}")?;
         return Ok(());

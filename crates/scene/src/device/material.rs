@@ -65,8 +65,9 @@ impl Materials {
         queue: &wgpu::Queue,
         layout: &wgpu::BindGroupLayout,
         scene: &Scene,
+        pre_exposure: f32,
     ) -> Vec<wgpu::BindGroup> {
-        scene.materials.iter().map(|material| self.bind_group(device, queue, layout, material)).collect()
+        scene.materials.iter().map(|material| self.bind_group(device, queue, layout, material, pre_exposure)).collect()
     }
 
     fn bind_group(
@@ -75,8 +76,9 @@ impl Materials {
         queue: &wgpu::Queue,
         layout: &wgpu::BindGroupLayout,
         material: &Material,
+        pre_exposure: f32,
     ) -> wgpu::BindGroup {
-        let bytes = material_bytes(material);
+        let bytes = material_bytes(material, pre_exposure);
         let uniform = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(&material.name),
             size: bytes.len() as u64,
@@ -130,11 +132,11 @@ fn upload(device: &wgpu::Device, queue: &wgpu::Queue, texture: &Texture, srgb: b
     create(device, queue, &texture.name, [texture.width, texture.height], format, &texture.rgba)
 }
 
-pub(super) fn environment_view(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) -> wgpu::TextureView {
+pub(super) fn environment_view(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene, pre_exposure: f32) -> wgpu::TextureView {
     let half = |value: f32| f16::from_f32(value.clamp(0.0, 65504.0)).to_le_bytes();
     let (extent, bytes) = match &scene.environment {
         Some(environment) => {
-            let texels = environment.pixels.iter().map(|pixel| *pixel * environment.scale);
+            let texels = environment.pixels.iter().map(|pixel| *pixel * (environment.scale * pre_exposure));
             let bytes = texels.flat_map(|pixel| [pixel.x, pixel.y, pixel.z, 1.0]).flat_map(half).collect();
             ([environment.width, environment.height], bytes)
         }

@@ -121,12 +121,12 @@ fn lights_are_laid_out_as_shaders_read_them() {
     let mut scene = Scene::default();
     scene.nodes.origin = Some(DVec3::new(10_000.0, 0.0, 0.0));
     // An empty list holds one light that does nothing.
-    let none = light_bytes(&scene);
+    let none = light_bytes(&scene, 1.0);
     assert_eq!((none.len(), layout.floats(&none, "intensity")), (layout.span, [0.0; 3]));
     let narrow = LightKind::Spot { inner: 0.01, outer: 0.01 };
     scene.lights =
         vec![light(LightKind::Point), light(LightKind::Spot { inner: 0.3, outer: 0.6 }), light(LightKind::Directional), light(narrow)];
-    let bytes = light_bytes(&scene);
+    let bytes = light_bytes(&scene, 1.0);
     assert_eq!(bytes.len(), 4 * layout.span);
     let at = |index: usize| &bytes[index * layout.span..];
     for (index, kind) in [0, 1, 2, 1].into_iter().enumerate() {
@@ -192,7 +192,7 @@ fn materials_are_laid_out_as_shaders_read_them() {
         normal_scale: 1.5,
         ..Material::default()
     };
-    let bytes = material_bytes(&material);
+    let bytes = material_bytes(&material, 1.0);
     assert_eq!(bytes.len(), layout.span);
     assert_eq!(layout.floats(&bytes, "base_color"), [0.1, 0.2, 0.3]);
     assert_eq!(layout.floats(&bytes, "metallic"), [0.4]);
@@ -203,6 +203,6 @@ fn materials_are_laid_out_as_shaders_read_them() {
     assert_eq!((layout.floats(&bytes, "normal_scale"), layout.floats(&bytes, "alpha_cutoff")), ([0.0], [0.0]));
     material.normal_texture = Some(TextureRef { texture: 0, sampler: Sampler::default() });
     material.alpha_mode = AlphaMode::Mask { cutoff: 0.75 };
-    let bytes = material_bytes(&material);
+    let bytes = material_bytes(&material, 1.0);
     assert_eq!((layout.floats(&bytes, "normal_scale"), layout.floats(&bytes, "alpha_cutoff")), ([1.5], [0.75]));
 }

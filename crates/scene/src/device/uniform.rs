@@ -25,8 +25,8 @@ pub struct ViewUniform {
     pub seed: u32,
     /// Times `tan(yfov / 2)`.
     pub up: Vec3,
-    /// Unused.
-    pub padding: u32,
+    /// [`super::GpuScene::pre_exposure`]; [`super::GpuScene::set_view`] fills it in.
+    pub pre_exposure: f32,
     /// Pixels.
     pub extent: Vec2,
     /// Added to sample positions, pixels.
@@ -66,7 +66,7 @@ impl ViewUniform {
             right: (camera.right * scale_x).as_vec3(),
             seed,
             up: (camera.up * scale_y).as_vec3(),
-            padding: 0,
+            pre_exposure: 1.0,
             extent: Vec2::new(width as f32, height as f32),
             jitter,
         }
@@ -123,7 +123,7 @@ pub(super) struct MaterialUniform {
     flags: u32,
 }
 
-pub(super) fn light_bytes(scene: &Scene) -> Vec<u8> {
+pub(super) fn light_bytes(scene: &Scene, pre_exposure: f32) -> Vec<u8> {
     let origin = scene.origin();
     let mut lights: Vec<LightUniform> = scene
         .lights
@@ -143,7 +143,7 @@ pub(super) fn light_bytes(scene: &Scene) -> Vec<u8> {
                 kind,
                 direction: light.direction.as_vec3(),
                 cos_outer,
-                intensity: light.intensity,
+                intensity: light.intensity * pre_exposure,
                 spot_scale,
             }
         })
@@ -163,7 +163,7 @@ pub(super) fn light_bytes(scene: &Scene) -> Vec<u8> {
 }
 
 /// Records of the area lights, and the corners of their outlines, one element each at least.
-pub(super) fn area_light_bytes(scene: &Scene) -> (Vec<u8>, Vec<u8>) {
+pub(super) fn area_light_bytes(scene: &Scene, pre_exposure: f32) -> (Vec<u8>, Vec<u8>) {
     let origin = scene.origin();
     let (mut lights, mut vertices) = (Vec::new(), Vec::new());
     for light in &scene.area_lights {
@@ -193,7 +193,7 @@ pub(super) fn area_light_bytes(scene: &Scene) -> (Vec<u8>, Vec<u8>) {
             vertex_count: outline.len() as u32,
             axis_c: (axes.z_axis * size).as_vec3(),
             two_sided: u32::from(light.two_sided),
-            radiance: light.radiance,
+            radiance: light.radiance * pre_exposure,
             padding: 0,
         });
     }
@@ -249,11 +249,11 @@ pub(super) fn view_bytes(view: &ViewUniform) -> Vec<u8> {
     uniform_bytes(view)
 }
 
-pub(super) fn material_bytes(material: &Material) -> Vec<u8> {
+pub(super) fn material_bytes(material: &Material, pre_exposure: f32) -> Vec<u8> {
     uniform_bytes(&MaterialUniform {
         base_color: material.base_color,
         metallic: material.metallic,
-        emissive: material.emissive,
+        emissive: material.emissive * pre_exposure,
         roughness: material.roughness,
         specular: material.specular,
         normal_scale: if material.normal_texture.is_some() { material.normal_scale } else { 0.0 },

@@ -87,3 +87,13 @@ fn distribution_names() {
     assert_eq!((Ndf::Ggx.to_string(), Ndf::Phong.to_string()), ("ggx".into(), "phong".into()));
     assert_eq!("beckmann".parse::<Ndf>().unwrap_err(), "`beckmann` is neither ggx nor phong");
 }
+
+#[test]
+fn built_in_scenes_are_of_ordinary_brightness() {
+    for (name, _) in builtin_names() {
+        let scene = Scene::load(&format!("builtin:{name}")).unwrap();
+        assert_eq!(scene.pre_exposure(), 1.0, "{name}");
+        let size = scene.seen_size();
+        assert!(size > 0.05 && size < scene.bounds().radius(), "{name}: {size}");
+    }
+}
