@@ -217,10 +217,11 @@ fn lights_that_no_pass_casts_are_always_named() {
 /// What `output` of a graph shows over what the truth of some light shows: 1 where the light is what was cast.
 fn ratio(scene: &Scene, graph: &str, output: &str, light: impl Fn(Claim) -> LightTransport) -> f64 {
     let graph = GraphFile::load(&root().join("graphs").join(graph)).unwrap();
-    let set = |text: &str| text.parse().unwrap();
-    let sets = if output.starts_with("indirect") { vec![set("lights.count=256"), set("indirect.clamp=none")] } else { Vec::new() };
+    let set = |text: &str| text.parse::<lobelia::graph::Override>().unwrap();
+    let sets = ["rsm.resolution=256", "lights.count=256", "indirect.clamp=none"].map(set);
+    let sets = if graph.passes.iter().any(|pass| pass.name.text == "rsm") { sets.to_vec() } else { Vec::new() };
     let wired = graph.wire(&lobelia::registry(), &[], &sets).unwrap();
-    let shot = Shot { extent: [32, 18], samples: 8, keep: vec![output.to_owned()], ..Shot::default() };
+    let shot = Shot { extent: [32, 18], samples: 4, keep: vec![output.to_owned()], ..Shot::default() };
     let plan = wired.plan(&scene.traits(), &shot.plan_options()).unwrap();
     let light = light(Claim::of_output(&plan, Some(output)));
     let settings = Settings { size: shot.extent, paths: LightPaths::Only(light), samples: 256, seed: 1 };
