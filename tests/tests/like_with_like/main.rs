@@ -221,7 +221,7 @@ fn ratio(scene: &Scene, graph: &str, output: &str, light: impl Fn(Claim) -> Ligh
     let sets = ["rsm.resolution=256", "lights.count=256", "indirect.clamp=none"].map(set);
     let sets = if graph.passes.iter().any(|pass| pass.name.text == "rsm") { sets.to_vec() } else { Vec::new() };
     let wired = graph.wire(&lobelia::registry(), &[], &sets).unwrap();
-    let shot = Shot { extent: [32, 18], samples: 4, keep: vec![output.to_owned()], ..Shot::default() };
+    let shot = Shot { extent: [32, 18], samples: 16, keep: vec![output.to_owned()], ..Shot::default() };
     let plan = wired.plan(&scene.traits(), &shot.plan_options()).unwrap();
     let light = light(Claim::of_output(&plan, Some(output)));
     let settings = Settings { size: shot.extent, paths: LightPaths::Only(light), samples: 256, seed: 1 };
