@@ -105,7 +105,7 @@ fn light_that_nobody_casts_decides_nothing_unless_it_is_asked_for() {
         // The share is what the two truths differ by.
         let [like, all] = ["like", "all"].map(|report| {
             let image = read_exr(&folder.join(report).join("reference.exr")).unwrap();
-            mean(&image).iter().map(|value| f64::from(*value)).sum::<f64>()
+            mean(&image).iter().sum::<f64>()
         });
         for (one, technique) in missing.iter().zip(["indirect:vpl", "indirect:no-visibility"]) {
             let share = one["share"].as_f64().unwrap();
@@ -229,7 +229,7 @@ fn ratio(scene: &Scene, graph: &str, output: &str, light: impl Fn(Claim) -> Ligh
     let mut session = Session::with(lobelia::graph::Gpu::new(&Default::default()).unwrap(), scene.clone(), 0.0).unwrap();
     let mut rendering = session.start(&wired, &shot).unwrap();
     rendering.run(&mut |_| true).unwrap();
-    let sum = |image: &lobelia::measure::Image| mean(image).iter().map(|value| f64::from(*value)).sum::<f64>();
+    let sum = |image: &lobelia::measure::Image| mean(image).iter().sum::<f64>();
     sum(&rendering.radiance(output).unwrap()) / sum(&expected)
 }
 
