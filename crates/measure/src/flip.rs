@@ -3,6 +3,7 @@
 
 use crate::{Image, MeasureError, metric::check_pair};
 use lobelia_lobes::tonemap::srgb_decode;
+use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// Pixels per degree of visual angle where nobody says: 0.7 m from a display of 0.7 m and 3840 pixels.
@@ -25,31 +26,56 @@ impl Flip {
 
 /// FLIP of pictures as they are displayed: sRGB-encoded values in [0, 1]; what is outside is clamped.
 pub fn flip_ldr(reference: &Image, test: &Image, pixels_per_degree: f64) -> Result<Flip, MeasureError> {
-    check_pair(reference, test)?;
-    let decode = |value: f32| srgb_decode(f64::from(value).clamp(0.0, 1.0));
-    let linear = |image: &Image| image.pixels.iter().map(|pixel| pixel.map(decode)).collect::<Vec<_>>();
-    let filters = Filters::new(pixels_per_degree)?;
-    Ok(Flip::new(difference(&filters, [reference.width, reference.height], &linear(reference), &linear(test))))
+    only(flip_ldr_each(reference, &[test], pixels_per_degree)?)
 }
 
 /// FLIP of linear radiance: the largest LDR-FLIP of each pixel over a range of exposures, chosen from the reference, under a fit of the ACES curve.
 ///
 /// A reference that is black has no exposures: its FLIP is that of the pictures as they are. Negative values count as 0.
 pub fn flip_hdr(reference: &Image, test: &Image, pixels_per_degree: f64) -> Result<Flip, MeasureError> {
-    check_pair(reference, test)?;
+    only(flip_hdr_each(reference, &[test], pixels_per_degree)?)
+}
+
+fn only(mut found: Vec<Flip>) -> Result<Flip, MeasureError> {
+    found.pop().ok_or(MeasureError::EmptyMask)
+}
+
+/// As [`flip_ldr`], of several pictures against one reference, whose part of the work is done once.
+pub(crate) fn flip_ldr_each(reference: &Image, tests: &[&Image], pixels_per_degree: f64) -> Result<Vec<Flip>, MeasureError> {
+    for test in tests {
+        check_pair(reference, test)?;
+    }
+    let decode = |value: f32| srgb_decode(f64::from(value).clamp(0.0, 1.0));
+    let linear = |image: &Image| image.pixels.iter().map(|pixel| pixel.map(decode)).collect::<Vec<_>>();
     let filters = Filters::new(pixels_per_degree)?;
-    let mut map = vec![0.0f64; reference.pixels.len()];
+    let size = [reference.width, reference.height];
+    let expected = Seen::new(&filters, size, &linear(reference));
+    let of = |test: &&Image| Flip::new(difference(&filters, &expected, &Seen::new(&filters, size, &linear(test))));
+    Ok(tests.par_iter().map(of).collect())
+}
+
+/// As [`flip_hdr`], of several pictures against one reference, whose part of the work is done once.
+pub(crate) fn flip_hdr_each(reference: &Image, tests: &[&Image], pixels_per_degree: f64) -> Result<Vec<Flip>, MeasureError> {
+    for test in tests {
+        check_pair(reference, test)?;
+    }
+    let filters = Filters::new(pixels_per_degree)?;
+    let size = [reference.width, reference.height];
+    let mut maps = vec![vec![0.0f64; reference.pixels.len()]; tests.len()];
     for exposure in Exposures::of(reference).each() {
         let shown = |image: &Image| {
             let scale = exposure.exp2();
             image.pixels.iter().map(|pixel| pixel.map(|value| aces(f64::from(value).max(0.0) * scale))).collect::<Vec<_>>()
         };
-        let here = difference(&filters, [reference.width, reference.height], &shown(reference), &shown(test));
-        for (largest, value) in map.iter_mut().zip(here) {
-            *largest = largest.max(value);
-        }
+        let expected = Seen::new(&filters, size, &shown(reference));
+        maps.par_iter_mut().zip(tests).for_each(|(map, test)| {
+            let here = difference(&filters, &expected, &Seen::new(&filters, size, &shown(test)));
+            for (largest, value) in map.iter_mut().zip(here) {
+                *largest = largest.max(value);
+            }
+        });
     }
-    Ok(Flip::new(map))
+    Ok(maps.into_iter().map(Flip::new).collect())
 }
 
 /// Exposures, in stops, at which pictures are compared.
@@ -244,9 +270,8 @@ fn filtered([width, height]: [usize; 2], values: &[f64], along_x: &[f64], along_
     out
 }
 
-/// LDR-FLIP of linear pictures in [0, 1].
-fn difference(filters: &Filters, size: [usize; 2], reference: &[Colour], test: &[Colour]) -> Vec<f64> {
-    let [reference, test] = [reference, test].map(|pixels| Seen::new(filters, size, pixels));
+/// LDR-FLIP of what is seen of two pictures.
+fn difference(filters: &Filters, reference: &Seen, test: &Seen) -> Vec<f64> {
     let colours = reference.colours.iter().zip(&test.colours).map(|(a, b)| {
         // Differences up to 0.4 of the largest are spread over [0, 0.95].
         let power = hyab(*a, *b).powf(COLOUR_POWER);
@@ -260,7 +285,7 @@ fn difference(filters: &Filters, size: [usize; 2], reference: &[Colour], test: &
     colours.zip(features).map(|(colour, feature)| colour.clamp(0.0, 1.0).powf(1.0 - feature)).collect()
 }
 
-/// What of a picture reaches the viewer.
+/// What of a linear picture in [0, 1] reaches the viewer.
 struct Seen {
     colours: Vec<Colour>,
     /// Strength of edges and of points.

@@ -1,7 +1,8 @@
 //! Measuring pictures. A metric is named for exactly what it computes.
 //!
 //! [`compare`] gives every metric of a reference and a test image at once, where a [`Mask`] counts; [`relative_mse`], [`relative_mse_with_epsilon`]
-//! and [`rmse`] give one over all pixels. [`measure`] gives everything that a report shows: those, and MAE, PSNR, SSIM, FLIP and fireflies. [`bias_variance`] and
+//! and [`rmse`] give one over all pixels. [`measure`] gives everything that a report shows: those, and MAE, PSNR, SSIM, FLIP and fireflies.
+//! [`measure_replicates`] gives them with what samples, seeds and the noise of the reference do to them, from which [`sampled`] makes intervals and ties. [`bias_variance`] and
 //! [`temporal_error`] take several pictures of one setting. All sums are 64-bit floats. [`read_exr`], [`write_exr`] and [`write_png`] move pictures in and out.
 
 pub mod flip;
@@ -9,6 +10,8 @@ mod image_file;
 mod mask;
 mod metric;
 mod metrics;
+mod replicates;
+pub mod sampled;
 mod sequence;
 mod ssim;
 pub mod timing;
@@ -17,8 +20,9 @@ pub use flip::{flip_hdr, flip_ldr};
 pub use image_file::{Precision, WriteSeek, read_exr, replace_file, write_exr, write_exr_with, write_png};
 pub use mask::Mask;
 pub use metric::{Statistics, compare, mean, relative_mse, relative_mse_with_epsilon, rmse};
-pub use metrics::{Metrics, display, false_colour, measure, relative_error_map};
-pub use sequence::{BiasVariance, bias_variance, temporal_error};
+pub use metrics::{Metrics, display, false_colour, measure, measure_each, relative_error_map};
+pub use replicates::{Pictures, measure_replicates, noise_floor};
+pub use sequence::{BiasVariance, bias_variance, temporal_error, temporal_errors};
 pub use ssim::ssim;
 
 /// Linear RGB, row 0 at the top.

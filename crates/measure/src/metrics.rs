@@ -8,6 +8,7 @@ use crate::{
 };
 use glam::DVec3;
 use lobelia_lobes::{luminance, tonemap::srgb_encode};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Metrics by name. Radiance is compared as it is; PSNR, SSIM and LDR-FLIP see both pictures as [`display`] shows them.
@@ -62,27 +63,59 @@ pub fn display(reference: &Image, image: &Image) -> Image {
     Image { pixels: image.pixels.iter().map(|pixel| pixel.map(shown)).collect(), ..image.clone() }
 }
 
+impl Metrics {
+    /// All of them, under the names of their fields.
+    pub fn by_name(&self) -> [(&'static str, f64); 9] {
+        [
+            ("relative_mse", self.relative_mse),
+            ("rmse", self.rmse),
+            ("mae", self.mae),
+            ("psnr", self.psnr),
+            ("ssim", self.ssim),
+            ("flip_ldr", self.flip_ldr),
+            ("flip_hdr", self.flip_hdr),
+            ("fireflies", self.fireflies),
+            ("mean_ratio", self.mean_ratio),
+        ]
+    }
+}
+
 /// All metrics of a finite pair of one size, over all pixels.
 pub fn measure(reference: &Image, test: &Image) -> Result<Metrics, MeasureError> {
-    check_pair(reference, test)?;
-    let basic = compare(reference, test, &Mask::all(reference))?;
-    let [shown_reference, shown_test] = [reference, test].map(|image| display(reference, image));
+    let mut found = measure_each(reference, &[test])?;
+    found.pop().ok_or(MeasureError::EmptyMask)
+}
+
+/// As [`measure`], of several pictures against one reference, whose part of the work is done once.
+pub fn measure_each(reference: &Image, tests: &[&Image]) -> Result<Vec<Metrics>, MeasureError> {
+    for test in tests {
+        check_pair(reference, test)?;
+    }
+    let shown_reference = display(reference, reference);
+    let shown: Vec<Image> = tests.par_iter().map(|test| display(reference, test)).collect();
+    let flip_ldr = flip::flip_ldr_each(&shown_reference, &shown.iter().collect::<Vec<_>>(), PIXELS_PER_DEGREE)?;
+    let flip_hdr = flip::flip_hdr_each(reference, tests, PIXELS_PER_DEGREE)?;
     let pairs = |a: &Image, b: &Image| -> Vec<f64> {
         a.pixels.as_flattened().iter().zip(b.pixels.as_flattened()).map(|(left, right)| f64::from(*left) - f64::from(*right)).collect()
     };
     let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / (3 * reference.pixels.len()) as f64;
-    let squared = mean(&mut pairs(&shown_reference, &shown_test).into_iter().map(|difference| difference * difference));
-    Ok(Metrics {
-        relative_mse: basic.relative_mse,
-        rmse: basic.rmse,
-        mae: mean(&mut pairs(reference, test).into_iter().map(f64::abs)),
-        psnr: -10.0 * squared.log10(),
-        ssim: ssim(&shown_reference, &shown_test)?.0,
-        flip_ldr: flip::flip_ldr(&shown_reference, &shown_test, PIXELS_PER_DEGREE)?.mean,
-        flip_hdr: flip::flip_hdr(reference, test, PIXELS_PER_DEGREE)?.mean,
-        fireflies: fireflies(reference, test) as f64 / reference.pixels.len() as f64 * 1e6,
-        mean_ratio: basic.mean_ratio,
-    })
+    let one = |index: usize| {
+        let (test, shown_test) = (tests[index], &shown[index]);
+        let basic = compare(reference, test, &Mask::all(reference))?;
+        let squared = mean(&mut pairs(&shown_reference, shown_test).into_iter().map(|difference| difference * difference));
+        Ok(Metrics {
+            relative_mse: basic.relative_mse,
+            rmse: basic.rmse,
+            mae: mean(&mut pairs(reference, test).into_iter().map(f64::abs)),
+            psnr: -10.0 * squared.log10(),
+            ssim: ssim(&shown_reference, shown_test)?.0,
+            flip_ldr: flip_ldr[index].mean,
+            flip_hdr: flip_hdr[index].mean,
+            fireflies: fireflies(reference, test) as f64 / reference.pixels.len() as f64 * 1e6,
+            mean_ratio: basic.mean_ratio,
+        })
+    };
+    (0..tests.len()).into_par_iter().map(one).collect()
 }
 
 /// Pixels that are ten times as bright as the reference there and next to it, and as all but two of their neighbours, and above a tenth of the reference's mean.

@@ -45,6 +45,12 @@ pub fn bias_variance(reference: &Image, tests: &[Image]) -> Result<BiasVariance,
 ///
 /// At least two frames of each; a black reference makes any flicker infinite.
 pub fn temporal_error(reference: &[Image], test: &[Image]) -> Result<(f64, Vec<f32>), MeasureError> {
+    let (steps, map) = temporal_errors(reference, test)?;
+    Ok((steps.iter().sum::<f64>() / steps.len() as f64, map))
+}
+
+/// As [`temporal_error`], with one value for each step from a frame to the next, whose mean it is.
+pub fn temporal_errors(reference: &[Image], test: &[Image]) -> Result<(Vec<f64>, Vec<f32>), MeasureError> {
     if reference.len() < 2 || reference.len() != test.len() {
         let what =
             format!("flicker needs two sequences of one length, at least 2 frames; they have {} and {}", reference.len(), test.len());
@@ -54,25 +60,27 @@ pub fn temporal_error(reference: &[Image], test: &[Image]) -> Result<(f64, Vec<f
         check_pair(expected, found)?;
         check_pair(&reference[0], expected)?;
     }
-    let mut map = vec![0.0f64; reference[0].pixels.len()];
+    let pixels = reference[0].pixels.len();
+    let total: f64 = reference.iter().flat_map(|frame| frame.pixels.as_flattened()).map(|value| f64::from(*value)).sum();
+    let mean = total / (3 * pixels * reference.len()) as f64;
+    let (mut map, mut steps) = (vec![0.0f64; pixels], Vec::new());
     for frame in 1..reference.len() {
+        let mut step = 0.0;
         for (index, sum) in map.iter_mut().enumerate() {
             for channel in 0..3 {
                 let change = |frames: &[Image]| {
                     f64::from(frames[frame].pixels[index][channel]) - f64::from(frames[frame - 1].pixels[index][channel])
                 };
-                *sum += (change(test) - change(reference)).abs() / 3.0;
+                let off = (change(test) - change(reference)).abs() / 3.0;
+                *sum += off;
+                step += off;
             }
         }
+        let flicker = step / pixels as f64;
+        steps.push(if flicker == 0.0 { 0.0 } else { flicker / mean });
     }
-    let steps = (reference.len() - 1) as f64;
-    let mean = |frames: &[Image]| {
-        let total: f64 = frames.iter().flat_map(|frame| frame.pixels.as_flattened()).map(|value| f64::from(*value)).sum();
-        total / (3 * map.len() * frames.len()) as f64
-    };
-    let flicker = map.iter().sum::<f64>() / steps / map.len() as f64;
-    let value = if flicker == 0.0 { 0.0 } else { flicker / mean(reference) };
-    Ok((value, map.iter().map(|sum| (sum / steps) as f32).collect()))
+    let count = (reference.len() - 1) as f64;
+    Ok((steps, map.iter().map(|sum| (sum / count) as f32).collect()))
 }
 
 #[cfg(test)]

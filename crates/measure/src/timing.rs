@@ -1,5 +1,6 @@
 //! Statistics of times: medians with their spread, and ratios of two things timed in turn.
 
+use crate::sampled::{Difference, Outcome, Replication, SHOWN_LEVEL, Sampled};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Median and spread of some times.
@@ -28,6 +29,39 @@ impl Summary {
             values[low] + (values[(low + 1).min(last)] - values[low]) * part
         };
         Some(Self { median: at(0.5), p5: at(0.05), p95: at(0.95), count: values.len() })
+    }
+}
+
+/// Share of the shorter of two times below which they are called equal, however sure their difference is: clocks and allocators move times by as much.
+pub const LEAST_CHANGE: f64 = 0.02;
+
+/// A time with its spread and an interval.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Timed {
+    /// Of all values of all rounds.
+    pub summary: Summary,
+    /// Natural logarithms: the median, and the median of each round.
+    pub logarithm: Sampled,
+}
+
+impl Timed {
+    /// Of the values of each round, in milliseconds. Rounds without a value above 0 are left out; `None` where none is left.
+    pub fn of(rounds: &[Vec<f64>]) -> Option<Self> {
+        let medians: Vec<f64> =
+            rounds.iter().filter_map(|round| Summary::of(round.iter().copied())).map(|summary| summary.median).filter(|ms| *ms > 0.0).collect();
+        let summary = Summary::of(rounds.iter().flatten().copied()).filter(|_| !medians.is_empty())?;
+        let replicates = medians.iter().map(|ms| ms.ln()).collect();
+        Some(Self { summary, logarithm: Sampled { value: summary.median.ln(), replicates, replication: Replication::Means } })
+    }
+
+    /// Ends of the 95 % interval of the median, if rounds are spread like a log-normal; `None` with fewer than two rounds.
+    pub fn interval(&self) -> Option<(f64, f64)> {
+        self.logarithm.interval(SHOWN_LEVEL).map(|interval| (interval.low.exp(), interval.high.exp()))
+    }
+
+    /// Which of two things that were timed in turn, round by round, takes less, if that is shown.
+    pub fn outcome(&self, other: &Self) -> Outcome {
+        Difference::paired(&self.logarithm, &other.logarithm).outcome(LEAST_CHANGE.ln_1p())
     }
 }
 
@@ -82,6 +116,22 @@ mod tests {
         assert!((summary.p5 - 1.15).abs() < 1e-12 && (summary.p95 - 3.85).abs() < 1e-12);
         assert_eq!(Summary::of([7.0]).unwrap().p95, 7.0);
         assert_eq!(Summary::of([f64::INFINITY]), None);
+    }
+
+    #[test]
+    fn times_have_intervals_over_rounds_and_ties() {
+        let rounds = |scale: f64| [1.0, 1.02, 0.99, 1.01].map(|round| vec![scale * round, scale * round * 1.3, scale * round * 0.9]);
+        let one = Timed::of(&rounds(2.0)).unwrap();
+        let (low, high) = one.interval().unwrap();
+        assert!(low < one.summary.median && one.summary.median < high && high / low < 1.06, "{low} {high}");
+        // What slows both in the same rounds hides no difference, but 1 % is none.
+        assert_eq!(one.outcome(&Timed::of(&rounds(2.1)).unwrap()), Outcome::First);
+        assert_eq!(Timed::of(&rounds(2.1)).unwrap().outcome(&one), Outcome::Second);
+        assert_eq!(one.outcome(&Timed::of(&rounds(2.02)).unwrap()), Outcome::Tie);
+        // One round says nothing of its noise.
+        let single = Timed::of(&[vec![1.0, 1.1]]).unwrap();
+        assert_eq!((single.interval(), single.outcome(&Timed::of(&[vec![9.0]]).unwrap())), (None, Outcome::Tie));
+        assert_eq!(Timed::of(&[vec![], vec![f64::NAN]]), None);
     }
 
     #[test]
