@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use lobelia::measure::{read_exr, relative_mse};
+use lobelia::report::{Better, Comparison, Replicated, Sweep};
 use lobelia_tests::{has_gpu, program, root};
 use serde_json::Value;
 use std::{
@@ -130,21 +131,30 @@ fn a_comparison_says_what_the_pictures_say() {
     let truth = read_exr(&place.path("out/reference.exr")).unwrap();
     let variants = report["variants"].as_array().unwrap();
     assert_eq!(variants.len(), 2);
-    for (variant, file) in variants.iter().zip(["indirect_vpl.exr", "indirect_no-visibility.exr"]) {
+    // The file is what its structures say, and holds nothing else.
+    let typed: Comparison = serde_json::from_value(report.clone()).unwrap();
+    assert_eq!(serde_json::to_value(&typed).unwrap(), report);
+    assert_eq!((typed.version, typed.settings.size, typed.settings.samples, typed.settings.rounds), (1, [48, 48], 4, 2));
+    assert_eq!((typed.reference.paths.as_deref(), typed.reference.depth, typed.reference.file.as_deref()), (Some("full"), Some(2), None));
+    assert_eq!(typed.replication, Replicated::Groups { count: 4 });
+    let floor = typed.reference.floor["relative_mse"];
+    assert!(floor > 0.0 && (0.5..2.0).contains(&(floor / typed.reference.relative_noise.unwrap())), "{:?}", typed.reference);
+    for (variant, file) in typed.variants.iter().zip(["indirect_vpl.exr", "indirect_no-visibility.exr"]) {
         let image = read_exr(&place.path("out").join(file)).unwrap();
-        let said = variant["metrics"]["relative_mse"].as_f64().unwrap();
-        assert!((said / relative_mse(&truth, &image).unwrap() - 1.0).abs() < 1e-9, "{file}: {said}");
-        assert!(variant["total_ms"].as_f64().unwrap() > 0.0 && variant["total_mebibytes"].as_f64().unwrap() > 0.0);
-        assert!(
-            variant["passes"]
-                .as_array()
-                .unwrap()
-                .iter()
-                .any(|pass| pass["name"] == "indirect" && pass["median_ms"].as_f64().unwrap() > 0.0)
-        );
+        let said = variant.metrics["relative_mse"];
+        assert!((said.value / relative_mse(&truth, &image).unwrap() - 1.0).abs() < 1e-9, "{file}: {said:?}");
+        for (name, metric) in &variant.metrics {
+            let (low, high) = (metric.low.unwrap(), metric.high.unwrap());
+            assert!(low <= metric.value && metric.value <= high, "{name}: {metric:?}");
+        }
+        assert!(said.low.unwrap() < said.value && said.value < said.high.unwrap());
+        assert!(variant.frame_ms.unwrap().median > 0.0 && variant.bytes > 0);
+        let pass = variant.passes.iter().find(|pass| pass.name == "lights").unwrap();
+        assert!(pass.gpu_ms.unwrap().median > 0.0 && pass.parameters["count"] == 64 && pass.kind == "vpl_lights", "{pass:?}");
+        assert_eq!(variant.tone.as_ref().map(|tone| (tone.curve.as_str(), tone.exposure)), Some(("agx", 2.0)));
     }
     // Light through walls is worse than light with shadows.
-    let error = |index: usize| variants[index]["metrics"]["relative_mse"].as_f64().unwrap();
+    let error = |index: usize| typed.variants[index].metrics["relative_mse"].value;
     assert!(error(0) < error(1), "{} {}", error(0), error(1));
     // What differs is the visibility, and nothing else.
     let passes: Vec<&str> = report["differences"].as_array().unwrap().iter().map(|row| row["pass"].as_str().unwrap()).collect();
@@ -158,11 +168,40 @@ fn a_comparison_says_what_the_pictures_say() {
         std::fs::read_dir(place.path("cache")).unwrap().map(|entry| entry.unwrap().metadata().unwrap().modified().unwrap()).collect();
     place.good(&format!("{COMPARE} --reference out/reference.exr --report again -q"));
     let again = place.json("again/report.json");
-    assert_eq!(again["variants"][0]["metrics"], report["variants"][0]["metrics"]);
+    // The noise of the reference lies beside it, so that intervals are the same, too, but for the digits that a file keeps.
+    for (name, metric) in report["variants"][0]["metrics"].as_object().unwrap() {
+        for part in ["value", "low", "high"] {
+            let (now, then) = (again["variants"][0]["metrics"][name][part].as_f64().unwrap(), metric[part].as_f64().unwrap());
+            assert!((now - then).abs() <= 1e-9 * then.abs(), "{name}.{part}: {now} {then}");
+        }
+    }
     place.good(&format!("{COMPARE} --report third -q"));
     let then: Vec<_> =
         std::fs::read_dir(place.path("cache")).unwrap().map(|entry| entry.unwrap().metadata().unwrap().modified().unwrap()).collect();
     assert_eq!((kept.len(), kept), (1, then));
+}
+
+/// A technique against itself is a tie in every metric, with many samples and with one, for which other seeds are rendered.
+#[test]
+fn a_technique_against_itself_is_a_tie() {
+    if !has_gpu() {
+        return;
+    }
+    let place = Place::new();
+    for (samples, replication) in [(1, Replicated::Seeds { count: 6 }), (5, Replicated::Groups { count: 5 })] {
+        let text = place.good(&format!(
+            "compare GRAPHS/indirect.ron:vpl GRAPHS/indirect.ron:vpl --scene builtin:cornell-glossy --size 24x24 --samples {samples} --rounds 2 \
+             --set lights.count=16 --set rsm.resolution=64 --reference-error 0.5 --report out"
+        ));
+        let report: Comparison = serde_json::from_value(place.json("out/report.json")).unwrap();
+        assert_eq!((report.replication, report.comparisons.len()), (replication, 10));
+        assert!(report.comparisons.iter().all(|one| one.better == Better::Tie || one.metric == "frame_ms"), "{:?}", report.comparisons);
+        let spread = report.variants[0].metrics["relative_mse"];
+        assert!(spread.high.unwrap() > 1.001 * spread.value, "{spread:?}");
+        assert!(text.contains("relative_mse: no difference is shown between indirect:vpl and indirect:vpl (2)"), "{text}");
+        let page = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+        assert!(page.contains("No difference in accuracy is shown between “indirect:vpl” and “indirect:vpl (2)”"));
+    }
 }
 
 #[test]
@@ -195,6 +234,7 @@ fn timeless(mut rows: Vec<Value>) -> Vec<Value> {
     for row in &mut rows {
         let row = row.as_object_mut().unwrap();
         row.remove("ms");
+        row.remove("round_ms");
         row.remove("passes");
     }
     rows
@@ -238,6 +278,11 @@ fn a_sweep_survives_kills_and_failures_and_is_the_sum_of_its_shards() {
     assert_eq!(timeless(place.rows("merged")), timeless(whole));
     let output = place.run("sweep --merge shard1 shard3 --report two");
     assert!(output.status.success() && String::from_utf8_lossy(&output.stderr).contains("4 of 12 runs are in none"), "{output:?}");
+    let typed: Sweep = serde_json::from_value(place.json("merged/report.json")).unwrap();
+    assert_eq!(serde_json::to_value(&typed).unwrap(), place.json("merged/report.json"));
+    let good = typed.rows.iter().find(|row| row.failed.is_none()).unwrap();
+    assert_eq!((typed.version, &good.parameters["lights.count"], good.round_ms.len()), (1, &Value::from(16), 1));
+    assert!(good.floor.unwrap() > 0.0 && good.error.as_ref().unwrap().replicates.len() == 6, "{good:?}");
     let page = std::fs::read_to_string(place.path("merged/report.html")).unwrap();
     assert!(page.contains("<svg") && page.contains("no such variant") && page.contains("lights.count"));
 }

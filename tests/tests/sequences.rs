@@ -43,7 +43,7 @@ impl Place {
         let output = self.run(&format!("compare {arguments} --size 32x32 --samples 1 --rounds 2 --reference-spp 64 --report out"));
         assert!(output.status.success(), "{arguments}\n{}", String::from_utf8_lossy(&output.stderr));
         let json: Value = serde_json::from_str(&std::fs::read_to_string(self.0.path().join("out/report.json")).unwrap()).unwrap();
-        let of = |variant: &Value| variant["metrics"]["temporal_error"].as_f64().unwrap();
+        let of = |variant: &Value| variant["metrics"]["temporal_error"]["value"].as_f64().unwrap();
         let found = json["variants"].as_array().unwrap().iter().map(of).collect();
         (found, json, String::from_utf8(output.stdout).unwrap())
     }
@@ -78,10 +78,15 @@ fn what_moves_as_the_truth_does_is_no_flicker() {
         place.flicker("g.ron:direct g.ron:few --scene moving.ron --paths direct --frames 4 --fps 6 --time 0.1 --new-seeds");
     let [direct, few] = found[..] else { panic!("{found:?}") };
     assert!(direct < 0.06 && few > 1.5 * direct, "{found:?}");
-    let sequence = json["scene"].as_array().unwrap().iter().find(|fact| fact[0] == "sequence").unwrap()[1].as_str().unwrap();
+    let sequence = &json["settings"]["sequence"];
+    assert_eq!((&sequence["frames"], &sequence["frames_per_second"], &sequence["new_seeds"]), (&4.into(), &6.0.into(), &true.into()));
+    assert_eq!((&sequence["flicker_against"], &sequence["own_samples"]), (&"truth".into(), &Value::Null));
     for said in ["4 frames, 6 per second, from 0.1 s", "path-traced frames", "random numbers of its own for each"] {
-        assert!(sequence.contains(said) && text.contains(said), "{sequence}\n{text}");
+        assert!(text.contains(said), "{text}");
     }
+    // Three steps tell the noise of the flicker.
+    let flicker = &json["variants"][1]["metrics"]["temporal_error"];
+    assert!(flicker["low"].as_f64().unwrap() < few && flicker["high"].as_f64().unwrap() > few, "{flicker}");
     // One picture has no flicker.
     let output = place.run("compare g.ron --scene moving.ron --size 8x8 --samples 1 --rounds 1 --reference-spp 4 --report one");
     assert!(output.status.success());

@@ -3,6 +3,7 @@
 pub mod adapters;
 pub mod check;
 pub mod compare;
+mod compare_report;
 pub mod explain;
 pub mod passes;
 pub mod reference;

@@ -36,6 +36,7 @@ pub use lobelia_vpl as vpl;
 pub use lobelia_vsgl as vsgl;
 pub use lobelia_vsl as vsl;
 
+pub mod comparison;
 pub mod explain;
 pub mod light;
 mod session;

@@ -62,6 +62,8 @@ pub struct Shot {
     pub camera: Option<String>,
     /// Sub-pixel-jittered frames that are averaged in linear radiance, >= 1. One frame samples pixel centres.
     pub samples: u32,
+    /// Groups in which samples are summed as well, sample `s` in group `s` modulo this; 1 for none. See [`Rendering::groups`].
+    pub groups: u32,
     /// Frames to run, >= 1; the last is the picture. More than one lets histories settle and steadies the times.
     pub frames: u32,
     /// Seconds between frames of an animated scene.
@@ -87,6 +89,7 @@ impl Default for Shot {
             extent: [960, 540],
             camera: None,
             samples: 1,
+            groups: 1,
             frames: 1,
             frame_seconds: 1.0 / 24.0,
             progressive: false,
@@ -250,6 +253,8 @@ pub fn frame_time(start: f32, shot: &Shot, frame: u32) -> f32 {
 struct Sum {
     name: String,
     total: Vec<[f64; 3]>,
+    /// One for each group of samples, if there are several.
+    groups: Vec<Vec<[f32; 3]>>,
 }
 
 /// A graph that is being rendered.
@@ -324,7 +329,7 @@ impl Rendering<'_> {
         self.runner.reset_history();
         for frame in 0..self.shot.frames {
             self.advance(frame);
-            self.sums = self.radiances().into_iter().map(|name| Sum { name, total: Vec::new() }).collect();
+            self.sums = self.radiances().into_iter().map(|name| Sum { name, total: Vec::new(), groups: Vec::new() }).collect();
             for sample in 0..self.shot.samples {
                 self.sample(frame, sample, step)?;
             }
@@ -375,6 +380,16 @@ impl Rendering<'_> {
                         total[channel] += f64::from(pixel[channel]);
                     }
                 }
+                if self.shot.groups > 1 {
+                    sum.groups.resize(self.shot.groups as usize, Vec::new());
+                    let group = &mut sum.groups[(sample % self.shot.groups) as usize];
+                    group.resize(pixels.len(), [0.0; 3]);
+                    for (total, pixel) in group.iter_mut().zip(&pixels) {
+                        for channel in 0..3 {
+                            total[channel] += pixel[channel];
+                        }
+                    }
+                }
             }
         }
         Ok(())
@@ -401,6 +416,25 @@ impl Rendering<'_> {
             }
         };
         Ok(Image { width, height, pixels })
+    }
+
+    /// Means of the groups of samples of a kept radiance, each with its share of the samples; empty without groups ([`Shot::groups`]).
+    pub fn groups(&self, name: &str) -> Vec<(f64, Image)> {
+        let resolved = self.plan().find(name).map_or(name, |index| self.plan().resources[index].name.as_str());
+        let [width, height] = self.shot.extent.map(|side| side as usize);
+        let groups = self.sums.iter().find(|sum| sum.name == resolved).map_or(&[][..], |sum| &sum.groups);
+        let (samples, count) = (self.shot.samples, self.shot.groups);
+        let mean = |(index, group): (u32, &Vec<[f32; 3]>)| {
+            let size = samples / count + u32::from(index < samples % count);
+            let pixels = group.iter().map(|total| total.map(|value| value / size as f32)).collect();
+            (f64::from(size) / f64::from(samples), Image { width, height, pixels })
+        };
+        (0..count).zip(groups).map(mean).collect()
+    }
+
+    /// Chooses other random numbers for what is run from now on.
+    pub fn set_seed(&mut self, seed: u32) {
+        self.shot.seed = seed;
     }
 
     fn picture(&mut self) -> Result<Picture, SessionError> {

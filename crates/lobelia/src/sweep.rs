@@ -9,7 +9,7 @@
 //!     seeds: [0, 1],
 //!     size: (240, 240),
 //!     samples: 4,                                         // sub-pixel samples
-//!     rounds: 3,                                          // renderings per run; the first warms up
+//!     rounds: 5,                                          // renderings per run; the first warms up
 //!     camera: "main",                                     // left out: the first of each scene
 //!     output: "indirect.radiance",                        // left out: what the graph ends in
 //!     paths: "one-bounce",                                // direct, one-bounce or full (up to depth 2); left out: what the graphs cast
@@ -20,6 +20,7 @@
 
 use crate::light::Lights;
 use lobelia_graph::Override;
+use lobelia_measure::sampled::{Replication, Sampled};
 use lobelia_report::Light;
 use serde::{Deserialize, Serialize};
 use std::{
@@ -150,7 +151,7 @@ fn samples() -> u32 {
 }
 
 fn rounds() -> u32 {
-    3
+    5
 }
 
 fn reference_error() -> f64 {
@@ -253,6 +254,18 @@ pub struct Row {
     /// Metrics by name. What has no finite value is null in the file.
     #[serde(deserialize_with = "null_as_infinity")]
     pub metrics: BTreeMap<String, f64>,
+    /// Each metric's replicates, in which samples, seeds and the noise of the reference vary; left out where they are not known or not finite.
+    #[serde(default)]
+    pub replicates: BTreeMap<String, Vec<f64>>,
+    /// What a replicate is.
+    #[serde(default)]
+    pub replication: Option<Replication>,
+    /// What a picture without error would score for the noise of the reference alone.
+    #[serde(default, deserialize_with = "null_as_infinity")]
+    pub floor: BTreeMap<String, f64>,
+    /// Median milliseconds of a frame in each timed round.
+    #[serde(default)]
+    pub round_ms: Vec<f64>,
     /// Median milliseconds of each pass.
     pub passes: Vec<(String, Option<f64>)>,
     /// Which light was compared.
@@ -281,10 +294,24 @@ impl Row {
             ms: None,
             mebibytes: None,
             metrics: BTreeMap::new(),
+            replicates: BTreeMap::new(),
+            replication: None,
+            floor: BTreeMap::new(),
+            round_ms: Vec::new(),
             passes: Vec::new(),
             light: None,
             failed: None,
         }
+    }
+
+    /// A metric with its replicates; `None` where the run has none, or one that is not finite.
+    pub fn sampled(&self, metric: &str) -> Option<Sampled> {
+        let value = self.metrics.get(metric).copied().filter(|value| value.is_finite())?;
+        let known = self.replicates.get(metric).zip(self.replication.as_ref());
+        Some(known.map_or_else(
+            || Sampled::alone(value),
+            |(replicates, replication)| Sampled { value, replicates: replicates.clone(), replication: replication.clone() },
+        ))
     }
 }
 

@@ -2,8 +2,12 @@
 
 use crate::{Rendering, Session, SessionError, Shot, Step};
 use lobelia_frame::{Radiance, SceneWorld};
-use lobelia_graph::{FrameReport, Gpu, GpuOptions, GraphFile, Override, PassTime, Problems, Registry, Resource, Timing, Wired};
-use lobelia_measure::{Image, timing::Summary};
+use lobelia_graph::{FrameReport, Gpu, GpuOptions, GraphFile, Override, Problems, Registry, Resource, Timing, Wired};
+use lobelia_measure::{
+    Image, Pictures,
+    sampled::Replication,
+    timing::{Summary, Timed},
+};
 use lobelia_scene::Scene;
 
 /// A graph with its variants and overrides applied.
@@ -36,10 +40,10 @@ pub struct PassMeasured {
     pub name: String,
     /// Registered name.
     pub kind: &'static str,
-    /// Parameters as RON.
-    pub params: String,
+    /// Parameters by name.
+    pub params: serde_json::Value,
     /// On the device, milliseconds a frame.
-    pub gpu_ms: Option<Summary>,
+    pub gpu_ms: Option<Timed>,
     /// Recording on the CPU, milliseconds a frame.
     pub cpu_ms: Option<Summary>,
     /// Bytes of what it makes.
@@ -51,8 +55,8 @@ pub struct PassMeasured {
 pub struct Measured {
     /// Name of the technique.
     pub name: String,
-    /// What is compared, linear radiance; of a sequence, its last frame.
-    pub image: Image,
+    /// What is compared, linear radiance, and what tells its noise; of a sequence, its last frame.
+    pub pictures: Pictures,
     /// All frames, if there are several.
     pub frames: Vec<Image>,
     /// `pass.port` of that.
@@ -64,7 +68,9 @@ pub struct Measured {
     /// Milliseconds on the device, a value for each counted round: the mean over its frames.
     pub round_ms: Vec<f64>,
     /// Milliseconds on the device over all frames of counted rounds.
-    pub frame_ms: Option<Summary>,
+    pub frame_ms: Option<Timed>,
+    /// How the graph itself brings radiance to a display: the `curve` of its last `tonemap` pass, and its exposure in stops.
+    pub tone: Option<(String, f64)>,
     /// Bytes of all resources, shared memory counted once.
     pub bytes: u64,
     /// Seconds that making pipelines took.
@@ -88,7 +94,22 @@ pub struct TrialStep<'a> {
     pub step: &'a Step,
 }
 
+/// The fewest groups of samples that tell the noise of a picture. Of a picture with fewer samples, whole pictures with other seeds do.
+const LEAST_GROUPS: u32 = 4;
+/// The most groups: more would cost more work and tell little more.
+const MOST_GROUPS: u32 = 8;
+/// Pictures with other seeds, the shown one counted, where samples are too few for groups.
+const REPEATS: u32 = 6;
+
+/// In how many groups the samples of a picture are summed.
+fn groups(samples: u32) -> u32 {
+    if samples < LEAST_GROUPS { 1 } else { samples.min(MOST_GROUPS) }
+}
+
 /// Renders every technique `rounds` times, in turn, so that what slows the machine for a while slows all of them. Each has a device of its own.
+///
+/// The noise of a picture is told by groups of its samples, at most eight. With fewer than four samples it is told by six pictures with other seeds: rounds after the
+/// first take other seeds then, and where there are fewer than six rounds, some follow that are not timed.
 pub fn run(
     scene: &Scene,
     techniques: &[Technique],
@@ -98,6 +119,7 @@ pub fn run(
 ) -> Result<Vec<Measured>, SessionError> {
     let mut shot = shot.clone();
     shot.keep.extend(options.output.clone());
+    shot.groups = groups(shot.samples);
     let mut sessions = Vec::new();
     for _ in techniques {
         let gpu = Gpu::new(&GpuOptions { adapter: options.adapter.clone(), baseline: options.baseline })?;
@@ -106,36 +128,53 @@ pub fn run(
         shot.run.timing = if gpu.has_timestamps() && !software { Timing::Timestamps } else { Timing::Isolated };
         sessions.push(Session::with(gpu, scene.clone(), options.time)?);
     }
-    let mut frames: Vec<Vec<Image>> = vec![Vec::new(); techniques.len()];
     let mut renderings = Vec::new();
     for (session, technique) in sessions.iter_mut().zip(techniques) {
         renderings.push(session.start(&technique.wired, &shot)?);
     }
-    let rounds = options.rounds.max(1);
-    let total = rounds as usize * techniques.len();
-    // For each technique, how many frames had been run at the end of each round.
+    let timed = options.rounds.max(1) as usize;
+    let rounds = if shot.groups > 1 { timed } else { timed.max(REPEATS as usize) };
+    let total = rounds * techniques.len();
+    let mut frames: Vec<Vec<Image>> = vec![Vec::new(); techniques.len()];
+    let mut pictures: Vec<Pictures> = Vec::new();
+    // For each technique, how many frames had been run at the end of each timed round.
     let mut ends: Vec<Vec<usize>> = vec![Vec::new(); techniques.len()];
-    for round in 0..rounds as usize {
+    for round in 0..rounds {
         for (index, (rendering, technique)) in renderings.iter_mut().zip(techniques).enumerate() {
             let done = round * techniques.len() + index;
-            // The first round of a sequence is kept: all rounds are of the same pictures.
-            let keep = (round == 0 && shot.frames > 1).then(|| output_of(rendering, technique, options)).transpose()?;
+            let output = output_of(rendering, technique, options)?;
+            if shot.groups == 1 {
+                // The seeds of samples are multiples of another number away from that of the picture.
+                rendering.set_seed(shot.seed.wrapping_add((round as u32).wrapping_mul(0x85eb_ca6b)));
+            }
+            // The first round of a sequence is kept.
+            let keep = round == 0 && shot.frames > 1;
             let kept = &mut frames[index];
-            let mut seen = |rendering: &Rendering<'_>| match &keep {
-                Some(output) => rendering.radiance(output).map(|image| kept.push(image)),
-                None => Ok(()),
+            let mut seen = |rendering: &Rendering<'_>| {
+                if keep {
+                    kept.push(rendering.radiance(&output)?);
+                }
+                Ok(())
             };
             rendering.run_frames(&mut |inner| step(&TrialStep { technique: &technique.name, done, total, step: inner }), &mut seen)?;
-            ends[index].push(rendering.reports().len());
+            if round < timed {
+                ends[index].push(rendering.reports().len());
+            }
+            if round == 0 {
+                let image = rendering.radiance(&output)?;
+                let (shares, parts): (Vec<f64>, Vec<Image>) = rendering.groups(&output).into_iter().unzip();
+                let replication = if shares.is_empty() { Replication::Repeats } else { Replication::LeaveOut(shares) };
+                let parts = if parts.is_empty() { vec![image.clone()] } else { parts };
+                pictures.push(Pictures { image, replication, parts });
+            } else if shot.groups == 1 && round < REPEATS as usize {
+                pictures[index].parts.push(rendering.radiance(&output)?);
+            }
         }
     }
-    renderings
-        .iter()
-        .zip(techniques)
-        .zip(&ends)
-        .zip(frames)
-        .map(|(((rendering, technique), ends), frames)| {
-            Ok(Measured { frames, ..measured(rendering, technique, ends, options, shot.run.timing)? })
+    let parts = renderings.iter().zip(techniques).zip(&ends).zip(frames.into_iter().zip(pictures));
+    parts
+        .map(|(((rendering, technique), ends), (frames, pictures))| {
+            measured(rendering, technique, ends, options, shot.run.timing, frames, pictures)
         })
         .collect()
 }
@@ -168,37 +207,44 @@ fn measured(
     ends: &[usize],
     options: &TrialOptions,
     timing: Timing,
+    frames: Vec<Image>,
+    pictures: Pictures,
 ) -> Result<Measured, SessionError> {
     let plan = rendering.plan();
     let output = output_of(rendering, technique, options)?;
     // The first round warms up where there are others.
-    let first = if ends.len() > 1 { ends[0] } else { 0 };
-    let counted = &rendering.reports()[first..];
+    let starts = std::iter::once(0).chain(ends.iter().copied());
+    let mut rounds: Vec<&[FrameReport]> = starts.zip(ends).map(|(start, end)| &rendering.reports()[start..*end]).collect();
+    if rounds.len() > 1 {
+        rounds.remove(0);
+    }
     let frame_ms = |report: &FrameReport| report.passes.iter().map(|pass| pass.gpu_ms).sum::<Option<f64>>();
-    let rounds = ends.windows(2).map(|pair| &rendering.reports()[pair[0]..pair[1]]);
-    let single = (ends.len() == 1).then_some(counted);
-    let mean = |reports: &[FrameReport]| {
+    let mean = |reports: &&[FrameReport]| {
         reports.iter().map(|report| frame_ms(report).unwrap_or(f64::NAN)).sum::<f64>() / reports.len().max(1) as f64
     };
     let passes = plan.passes.iter().map(|pass| {
-        let times = || counted.iter().flat_map(|report| &report.passes).filter(|time: &&PassTime| time.pass == pass.name);
+        let of = |report: &FrameReport| report.passes.iter().filter(|time| time.pass == pass.name).cloned().collect::<Vec<_>>();
+        let gpu = |reports: &&[FrameReport]| reports.iter().flat_map(of).filter_map(|time| time.gpu_ms).collect::<Vec<f64>>();
         PassMeasured {
             name: pass.name.clone(),
             kind: pass.kind_name(),
-            params: pass.params_ron(),
-            gpu_ms: Summary::of(times().filter_map(|time| time.gpu_ms)),
-            cpu_ms: Summary::of(times().map(|time| time.cpu_ms)),
+            params: pass.params_json(),
+            gpu_ms: Timed::of(&rounds.iter().map(gpu).collect::<Vec<_>>()),
+            cpu_ms: Summary::of(rounds.iter().flat_map(|reports| reports.iter()).flat_map(of).map(|time| time.cpu_ms)),
             bytes: pass.outputs.iter().map(|index| plan.resources[*index].bytes()).sum(),
         }
     });
+    let tonemap = plan.passes.iter().rev().find(|pass| pass.kind_name() == "tonemap").map(|pass| pass.params_json());
+    let tone = tonemap.and_then(|params| Some((params["curve"].as_str()?.to_owned(), params["exposure"].as_f64()?)));
     Ok(Measured {
         name: technique.name.clone(),
-        image: rendering.radiance(&output)?,
-        frames: Vec::new(),
+        pictures,
+        frames,
         passes: passes.collect(),
         dropped: plan.dropped.iter().map(|dropped| (dropped.pass.clone(), dropped.reason.clone())).collect(),
-        round_ms: rounds.chain(single).map(mean).collect(),
-        frame_ms: Summary::of(counted.iter().filter_map(frame_ms)),
+        round_ms: rounds.iter().map(mean).collect(),
+        frame_ms: Timed::of(&rounds.iter().map(|reports| reports.iter().filter_map(frame_ms).collect()).collect::<Vec<_>>()),
+        tone,
         bytes: plan.bytes(),
         compile_seconds: rendering.gpu().pipeline_statistics().seconds,
         device: rendering.gpu().info().map_or_else(|| "unknown".to_owned(), |info| info.name.clone()),
@@ -207,51 +253,34 @@ fn measured(
     })
 }
 
-/// A pass of two techniques that is not the same in both.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Difference {
-    /// Name in the graphs.
-    pub pass: String,
-    /// What differs, in words: it is missing on one side, of another kind, or has other parameters.
-    pub what: String,
-    /// Change of its time on the device, as a share of the first's; NaN where one side has none.
-    pub change: f64,
+/// What differs in a pass of two techniques.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Change {
+    /// Only the first technique has it.
+    OnlyFirst,
+    /// Only the second technique has it.
+    OnlySecond,
+    /// Another kind of pass.
+    Kind,
+    /// Other parameters.
+    Parameters,
 }
 
-/// Which passes differ between two techniques, in the order of the first and then of the second.
-pub fn differences(a: &Measured, b: &Measured) -> Vec<Difference> {
+/// Which passes differ between two techniques, in the order of the first and then of the second: its name, and what differs.
+pub fn differences(a: &Measured, b: &Measured) -> Vec<(String, Change)> {
     let find = |measured: &'_ Measured, name: &str| measured.passes.iter().position(|pass| pass.name == name);
-    let ms = |pass: &PassMeasured| pass.gpu_ms.map_or(f64::NAN, |summary| summary.median);
-    let text = |pass: &PassMeasured| format!("{:.2} ms", ms(pass));
     let mut found = Vec::new();
     for left in &a.passes {
-        match find(b, &left.name).map(|index| &b.passes[index]) {
-            None => found.push(Difference {
-                pass: left.name.clone(),
-                what: format!("only in {} ({}, {})", a.name, left.kind, text(left)),
-                change: f64::NAN,
-            }),
-            Some(right) if left.kind != right.kind || left.params != right.params => {
-                let what = if left.kind == right.kind {
-                    "other parameters".to_owned()
-                } else {
-                    format!("{} instead of {}", right.kind, left.kind)
-                };
-                let what = format!("{what}; {} against {}", text(right), text(left));
-                found.push(Difference { pass: left.name.clone(), what, change: ms(right) / ms(left) - 1.0 });
-            }
-            Some(_) => {}
-        }
+        let change = match find(b, &left.name).map(|index| &b.passes[index]) {
+            None => Change::OnlyFirst,
+            Some(right) if left.kind != right.kind => Change::Kind,
+            Some(right) if left.params != right.params => Change::Parameters,
+            Some(_) => continue,
+        };
+        found.push((left.name.clone(), change));
     }
-    for right in &b.passes {
-        if find(a, &right.name).is_none() {
-            found.push(Difference {
-                pass: right.name.clone(),
-                what: format!("only in {} ({}, {})", b.name, right.kind, text(right)),
-                change: f64::NAN,
-            });
-        }
-    }
+    let new = b.passes.iter().filter(|right| find(a, &right.name).is_none());
+    found.extend(new.map(|right| (right.name.clone(), Change::OnlySecond)));
     found
 }
 

@@ -21,7 +21,7 @@ pub use image_file::{Precision, WriteSeek, read_exr, replace_file, write_exr, wr
 pub use mask::Mask;
 pub use metric::{Statistics, compare, mean, relative_mse, relative_mse_with_epsilon, rmse};
 pub use metrics::{Metrics, display, false_colour, measure, measure_each, relative_error_map};
-pub use replicates::{Pictures, measure_replicates, noise_floor};
+pub use replicates::{Pictures, measure_replicates, noise_floor, replicate};
 pub use sequence::{BiasVariance, bias_variance, temporal_error, temporal_errors};
 pub use ssim::ssim;
 

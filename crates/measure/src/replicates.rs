@@ -38,11 +38,6 @@ impl Pictures {
             _ => self.parts[index].clone(),
         }
     }
-
-    /// All replicates, made one at a time.
-    pub fn replicates(&self) -> impl Iterator<Item = Image> + '_ {
-        (0..self.parts.len()).map(|index| self.replicate(index))
-    }
 }
 
 /// A picture with normal noise of the given variance added, times `scale`; the same `draw` adds the same noise. The channels of a pixel share one draw, as those of a path
@@ -66,6 +61,19 @@ fn normal(draw: u64, index: u64) -> f64 {
     };
     let uniform = |salt: u64| ((hash(hash(2 * index + salt) ^ hash(!draw)) >> 11) as f64 + 0.5) / (1u64 << 53) as f64;
     (-2.0 * uniform(0).ln()).sqrt() * (TAU * uniform(1)).cos()
+}
+
+/// The reference and the picture of each technique in one replicate, none for a technique that has fewer. All techniques see the same moved reference; an empty `variance`
+/// leaves it where it is.
+pub fn replicate(reference: &Image, variance: &[[f32; 3]], techniques: &[Pictures], index: usize) -> (Image, Vec<Option<Image>>) {
+    let scale = techniques.iter().find(|technique| index < technique.parts.len()).map_or(1.0, |technique| match &technique.replication {
+        // Without a group, a mean moves by the root of this, times its standard deviation.
+        Replication::LeaveOut(shares) => shares[index].sqrt() / (1.0 - shares[index]),
+        _ => 1.0,
+    });
+    let moved = if variance.is_empty() { reference.clone() } else { jostled(reference, variance, scale, index as u64) };
+    let pictures = techniques.iter().map(|technique| (index < technique.parts.len()).then(|| technique.replicate(index)));
+    (moved, pictures.collect())
 }
 
 /// Metrics of several techniques against one reference, by name, each with replicates in which the samples of the technique and the noise of the reference vary.
@@ -96,16 +104,10 @@ pub fn measure_replicates(
     let values = measure_each(reference, &images)?;
     let rounds = techniques.iter().map(|technique| technique.parts.len()).max().unwrap_or(0);
     let round = |index: usize| -> Result<Vec<Option<Metrics>>, MeasureError> {
-        let taking: Vec<&Pictures> = techniques.iter().filter(|technique| index < technique.parts.len()).collect();
-        let scale = taking.first().map_or(1.0, |technique| match &technique.replication {
-            // Without a group, a mean moves by the root of this, times its standard deviation.
-            Replication::LeaveOut(shares) => shares[index].sqrt() / (1.0 - shares[index]),
-            _ => 1.0,
-        });
-        let moved = if variance.is_empty() { reference.clone() } else { jostled(reference, variance, scale, index as u64) };
-        let replicates: Vec<Image> = taking.iter().map(|technique| technique.replicate(index)).collect();
-        let mut found = measure_each(&moved, &replicates.iter().collect::<Vec<_>>())?.into_iter();
-        Ok(techniques.iter().map(|technique| if index < technique.parts.len() { found.next() } else { None }).collect())
+        let (moved, pictures) = replicate(reference, variance, techniques, index);
+        let taking: Vec<&Image> = pictures.iter().flatten().collect();
+        let mut found = measure_each(&moved, &taking)?.into_iter();
+        Ok(pictures.iter().map(|picture| picture.as_ref().and_then(|_| found.next())).collect())
     };
     let replicates: Vec<Vec<Option<Metrics>>> = (0..rounds).into_par_iter().map(round).collect::<Result<_, _>>()?;
     let sampled = |(index, (technique, value)): (usize, (&Pictures, Metrics))| {

@@ -54,6 +54,13 @@ pub struct StandardError {
 }
 
 impl StandardError {
+    /// Of the sum or the difference of two values that share nothing; degrees of freedom by Welch (1947) and Satterthwaite (1946).
+    pub fn with(self, other: Self) -> Self {
+        let (a, b) = (self.size * self.size, other.size * other.size);
+        let freedom = if a + b > 0.0 { (a + b).powi(2) / (a * a / self.freedom + b * b / other.freedom) } else { self.freedom };
+        Self { size: (a + b).sqrt(), freedom }
+    }
+
     /// Half the width of an interval of this confidence, by Student's distribution.
     pub fn reach(&self, level: f64) -> f64 {
         if self.size == 0.0 {
@@ -170,13 +177,9 @@ impl Difference {
         Self { value: both.value, error: both.standard_error() }
     }
 
-    /// Of two values that share nothing; degrees of freedom by Welch and Satterthwaite.
+    /// Of two values that share nothing.
     pub fn unpaired(first: &Sampled, second: &Sampled) -> Self {
-        let error = first.standard_error().zip(second.standard_error()).map(|(a, b)| {
-            let (va, vb) = (a.size * a.size, b.size * b.size);
-            let freedom = if va + vb > 0.0 { (va + vb).powi(2) / (va * va / a.freedom + vb * vb / b.freedom) } else { a.freedom };
-            StandardError { size: (va + vb).sqrt(), freedom }
-        });
+        let error = first.standard_error().zip(second.standard_error()).map(|(a, b)| a.with(b));
         Self { value: first.value - second.value, error }
     }
 

@@ -47,8 +47,12 @@ pub struct Timed {
 impl Timed {
     /// Of the values of each round, in milliseconds. Rounds without a value above 0 are left out; `None` where none is left.
     pub fn of(rounds: &[Vec<f64>]) -> Option<Self> {
-        let medians: Vec<f64> =
-            rounds.iter().filter_map(|round| Summary::of(round.iter().copied())).map(|summary| summary.median).filter(|ms| *ms > 0.0).collect();
+        let medians: Vec<f64> = rounds
+            .iter()
+            .filter_map(|round| Summary::of(round.iter().copied()))
+            .map(|summary| summary.median)
+            .filter(|ms| *ms > 0.0)
+            .collect();
         let summary = Summary::of(rounds.iter().flatten().copied()).filter(|_| !medians.is_empty())?;
         let replicates = medians.iter().map(|ms| ms.ln()).collect();
         Some(Self { summary, logarithm: Sampled { value: summary.median.ln(), replicates, replication: Replication::Means } })

@@ -29,7 +29,11 @@ impl Random {
 
 fn truth() -> Image {
     let value = |index: usize| 0.2 + (index % SIZE[0]) as f32 * 0.1 + (index / SIZE[0]) as f32 * 0.05;
-    Image { width: SIZE[0], height: SIZE[1], pixels: (0..VALUES).map(|index| [value(index), 0.8 * value(index), 0.5 * value(index)]).collect() }
+    Image {
+        width: SIZE[0],
+        height: SIZE[1],
+        pixels: (0..VALUES).map(|index| [value(index), 0.8 * value(index), 0.5 * value(index)]).collect(),
+    }
 }
 
 /// A technique: relative bias, and relative noise of one sample, for each pixel and for bands of the picture, as virtual lights make it.

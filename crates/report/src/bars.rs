@@ -1,7 +1,7 @@
 //! What each pass costs, as bars with numbers: variants side by side, all bars of a table on one scale.
 
 use crate::data::{Comparison, PassCost, Variant};
-use crate::html::{escape, number, with_unit};
+use crate::html::{escape, mebibytes, number, time_with_interval, with_unit};
 
 /// Names of the passes of all variants: the order of the first variant, a pass that only a later variant has after the one that
 /// it follows there.
@@ -24,22 +24,25 @@ pub(crate) fn pass_names(variants: &[Variant]) -> Vec<&str> {
 
 /// The table of times.
 pub(crate) fn times(comparison: &Comparison) -> String {
-    let largest = largest(comparison, |pass| pass.p95_ms.max(pass.median_ms));
+    let largest = largest(comparison, |pass| pass.gpu_ms.map_or(0.0, |time| time.p95.max(time.median)));
     let cell = |pass: &PassCost| {
-        let range = format!("{} to {}", number(pass.p5_ms), with_unit(pass.p95_ms, "ms"));
-        let (from, to) = (percent(pass.p5_ms, largest), percent(pass.p95_ms, largest));
+        let cpu = pass.cpu_ms.map_or_else(String::new, |ms| format!("CPU {}", with_unit(ms, "ms")));
+        let Some(time) = &pass.gpu_ms else { return bar(0.0, "", "not measured", &cpu) };
+        let range = format!("{} to {}", number(time.p5), with_unit(time.p95, "ms"));
+        let (from, to) = (percent(time.p5, largest), percent(time.p95, largest));
         let whisker = format!("<i class=\"whisker\" style=\"left:{from:.2}%;width:{:.2}%\"></i>", (to - from).max(0.0));
-        let cpu = format!("CPU {}", with_unit(pass.cpu_ms, "ms"));
-        bar(percent(pass.median_ms, largest), &whisker, &with_unit(pass.median_ms, "ms"), &format!("{range} · {cpu}"))
+        let small = [range, cpu].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" · ");
+        bar(percent(time.median, largest), &whisker, &time_with_interval(time), &small)
     };
-    table(comparison, "Time of each pass", cell, |variant| with_unit(variant.total_ms, "ms"))
+    let total = |variant: &Variant| variant.frame_ms.map_or_else(|| "not measured".to_owned(), |time| time_with_interval(&time));
+    table(comparison, "Time of each pass", cell, total)
 }
 
 /// The table of memory.
 pub(crate) fn memory(comparison: &Comparison) -> String {
-    let largest = largest(comparison, |pass| pass.mebibytes);
-    let cell = |pass: &PassCost| bar(percent(pass.mebibytes, largest), "", &with_unit(pass.mebibytes, "MiB"), "");
-    table(comparison, "Memory of each pass", cell, |variant| with_unit(variant.total_mebibytes, "MiB"))
+    let largest = largest(comparison, |pass| mebibytes(pass.bytes));
+    let cell = |pass: &PassCost| bar(percent(mebibytes(pass.bytes), largest), "", &with_unit(mebibytes(pass.bytes), "MiB"), "");
+    table(comparison, "Memory of each pass", cell, |variant| with_unit(mebibytes(variant.bytes), "MiB"))
 }
 
 fn largest(comparison: &Comparison, value: impl Fn(&PassCost) -> f64) -> f64 {
@@ -69,7 +72,7 @@ fn table(comparison: &Comparison, caption: &str, cell: impl Fn(&PassCost) -> Str
         for (index, variant) in variants.iter().enumerate() {
             let mut found = variant.passes.iter().filter(|pass| pass.name == name).peekable();
             if found.peek().is_none() {
-                let pruned = variant.pruned.iter().any(|(pass, _)| pass == name);
+                let pruned = variant.pruned.iter().any(|one| one.pass == name);
                 rows.push_str(&format!("<td class=\"quiet\">{}</td>", if pruned { "pruned" } else { "not in this variant" }));
             } else {
                 let cells: String = found.map(&cell).collect::<Vec<_>>().join("");

@@ -1,53 +1,34 @@
-//! Choices on error and time. A point is (time in milliseconds, error); one with a value that is not finite is never chosen.
+//! Choices on error and time that respect their noise.
+//!
+//! Two values differ where the 99 % interval of their difference leaves out 0 and the difference is at least 1 % of the smaller error, or 2 % of the smaller time: else they
+//! tie. Errors are compared by the differences of their replicates, in which the noise of the reference cancels; times of different runs share nothing. A value of which
+//! no noise is known counts as exact.
 
-use crate::data::SweepRow;
+use crate::sweep_data::SweepRow;
+use lobelia_measure::{
+    sampled::{Difference, Interval, Outcome, Replication, SHOWN_LEVEL, Sampled, StandardError},
+    timing::LEAST_CHANGE,
+};
+use std::collections::BTreeMap;
 
-fn finite(point: (f64, f64)) -> bool {
-    point.0.is_finite() && point.1.is_finite()
-}
-
-/// Indices of the points that no other point beats in both time and error, by rising time.
-///
-/// A point beats another when it is no worse in both and better in one: of two points with one time, only the more accurate
-/// stays; equal points all stay.
-pub fn pareto_front(points: &[(f64, f64)]) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..points.len()).filter(|&index| finite(points[index])).collect();
-    order.sort_by(|&a, &b| points[a].0.total_cmp(&points[b].0).then(points[a].1.total_cmp(&points[b].1)));
-    let mut front: Vec<usize> = Vec::new();
-    for index in order {
-        let stays = front.last().is_none_or(|&last| points[index].1 < points[last].1 || points[index] == points[last]);
-        if stays {
-            front.push(index);
-        }
-    }
-    front
-}
-
-/// Index of the fastest point with an error of at most `target_error`; of equally fast ones the more accurate. None where no
-/// point reaches it.
-pub fn cheapest_under_error(points: &[(f64, f64)], target_error: f64) -> Option<usize> {
-    let reached = (0..points.len()).filter(|&index| finite(points[index]) && points[index].1 <= target_error);
-    reached.min_by(|&a, &b| points[a].0.total_cmp(&points[b].0).then(points[a].1.total_cmp(&points[b].1)))
-}
-
-/// Index of the most accurate point with a time of at most `target_ms` milliseconds; of equally accurate ones the faster. None
-/// where no point is that fast.
-pub fn most_accurate_under_time(points: &[(f64, f64)], target_ms: f64) -> Option<usize> {
-    let reached = (0..points.len()).filter(|&index| finite(points[index]) && points[index].0 <= target_ms);
-    reached.min_by(|&a, &b| points[a].1.total_cmp(&points[b].1).then(points[a].0.total_cmp(&points[b].0)))
-}
+/// Share of the smaller of two errors below which they are called equal, however sure their difference is.
+const LEAST_ERROR: f64 = 0.01;
 
 /// Runs of one variant with one set of parameters, taken together.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Configuration {
     /// Name of the variant.
     pub variant: String,
-    /// Parameters, as (name, value).
-    pub parameters: Vec<(String, String)>,
+    /// Parameters by name.
+    pub parameters: BTreeMap<String, serde_json::Value>,
     /// Time in milliseconds.
     pub ms: f64,
+    /// Its standard error; none where it is not known.
+    pub ms_error: Option<StandardError>,
     /// Error.
-    pub error: f64,
+    pub error: Sampled,
+    /// What a picture without error would score for the noise of the reference alone, where that is known.
+    pub floor: Option<f64>,
     /// How many runs are behind it (in [`configurations`]), or how many scenes (in [`overall`]).
     pub count: usize,
 }
@@ -55,61 +36,213 @@ pub struct Configuration {
 impl Configuration {
     /// (time in milliseconds, error).
     pub fn point(&self) -> (f64, f64) {
-        (self.ms, self.error)
+        (self.ms, self.error.value)
+    }
+
+    fn is_finite(&self) -> bool {
+        self.ms.is_finite() && self.error.value.is_finite()
+    }
+
+    /// 95 % interval of the time.
+    pub fn ms_interval(&self) -> Option<Interval> {
+        let reach = self.ms_error?.reach(SHOWN_LEVEL);
+        // A reach beyond the value itself tells no lower end; a time is above 0.
+        reach.is_finite().then_some(Interval { low: (self.ms - reach).max(0.0), high: self.ms + reach })
+    }
+
+    /// 95 % interval of the error, not below 0.
+    pub fn error_interval(&self) -> Option<Interval> {
+        let found = self.error.interval(SHOWN_LEVEL)?;
+        Some(Interval { low: found.low.max(0.0), high: found.high })
+    }
+
+    /// Which of two takes less time, if that is shown.
+    pub fn faster(&self, other: &Self) -> Outcome {
+        let error = self.ms_error.zip(other.ms_error).map(|(a, b)| a.with(b));
+        outcome(Difference { value: self.ms - other.ms, error }, LEAST_CHANGE * self.ms.min(other.ms))
+    }
+
+    /// Which of two has the lesser error, if that is shown.
+    pub fn more_accurate(&self, other: &Self) -> Outcome {
+        outcome(Difference::paired(&self.error, &other.error), LEAST_ERROR * self.error.value.min(other.error.value))
+    }
+
+    /// Whether this is shown to be better in time or error, and is not shown to be worse in the other.
+    pub fn beats(&self, other: &Self) -> bool {
+        let outcomes = [self.faster(other), self.more_accurate(other)];
+        outcomes.contains(&Outcome::First) && !outcomes.contains(&Outcome::Second)
     }
 }
 
-/// Configurations of one scene in the order of the rows: mean time and mean error over the seeds, so that no lucky seed is
-/// chosen. A configuration with a failed run, or with a value that is not finite, is left out: a mean over the runs that happened
-/// to end would flatter it.
+/// As [`Difference::outcome`], but what has no known noise counts as exact.
+fn outcome(difference: Difference, least: f64) -> Outcome {
+    let error = difference.error.or(Some(StandardError { size: 0.0, freedom: 1.0 }));
+    if difference.value.abs() <= least { Outcome::Tie } else { Difference { error, ..difference }.outcome(0.0) }
+}
+
+/// Indices of the Pareto front, by rising time: a configuration is left out if, and only if, one on the front beats it ([`Configuration::beats`]).
+///
+/// Being beaten by one that is left out itself does not count. Ties are not transitive: in a row of configurations each of which ties with the next in time and is less
+/// accurate, all but the last would be beaten by their neighbour, though the first may be far faster than the last. That rule has one solution where beating makes no
+/// circles, and noise of different sizes can make them; of a circle, the configuration with the least product of time and error stays.
+pub fn pareto_front(points: &[Configuration]) -> Vec<usize> {
+    let beats: Vec<Vec<bool>> =
+        points.iter().map(|a| points.iter().map(|b| a.is_finite() && b.is_finite() && a.beats(b)).collect()).collect();
+    let mut open: Vec<usize> = (0..points.len()).filter(|&index| points[index].is_finite()).collect();
+    let mut front: Vec<usize> = Vec::new();
+    while !open.is_empty() {
+        let unbeaten = |&&index: &&usize| !open.iter().any(|&other| beats[other][index]);
+        let product = |index: usize| points[index].ms * points[index].error.value;
+        let circle = || open.iter().min_by(|&&a, &&b| product(a).total_cmp(&product(b)));
+        let Some(&stays) = open.iter().find(unbeaten).or_else(circle) else { break };
+        front.push(stays);
+        open.retain(|&index| index != stays && !beats[stays][index]);
+    }
+    front.sort_by(|&a, &b| points[a].ms.total_cmp(&points[b].ms).then(points[a].error.value.total_cmp(&points[b].error.value)));
+    front
+}
+
+/// What a target chooses.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Choice {
+    /// One that is shown to meet the target, and others that do and between which and it no difference is shown in what the choice is by.
+    Found {
+        /// Index of the chosen one.
+        index: usize,
+        /// Indices of the others.
+        ties: Vec<usize>,
+    },
+    /// None is shown to meet it; this one meets it by its value, but its interval reaches beyond.
+    Perhaps(usize),
+    /// None meets it.
+    Nothing,
+}
+
+/// The fastest configuration whose 95 % interval of the error ends at or below `target_error`. Of those that tie with it in time, the most accurate is chosen.
+pub fn cheapest_under_error(points: &[Configuration], target_error: f64) -> Choice {
+    choose(
+        points,
+        |point| point.error.value <= target_error,
+        |point| point.error_interval().is_none_or(|interval| interval.high <= target_error),
+        |point| point.ms,
+        |point| point.error.value,
+        Configuration::faster,
+    )
+}
+
+/// The most accurate configuration whose 95 % interval of the time ends at or below `target_ms` milliseconds. Of those that tie with it in error, the fastest is chosen.
+pub fn most_accurate_under_time(points: &[Configuration], target_ms: f64) -> Choice {
+    choose(
+        points,
+        |point| point.ms <= target_ms,
+        |point| point.ms_interval().is_none_or(|interval| interval.high <= target_ms),
+        |point| point.error.value,
+        |point| point.ms,
+        Configuration::more_accurate,
+    )
+}
+
+fn choose(
+    points: &[Configuration],
+    by_value: impl Fn(&Configuration) -> bool,
+    shown: impl Fn(&Configuration) -> bool,
+    least: impl Fn(&Configuration) -> f64,
+    then: impl Fn(&Configuration) -> f64,
+    outcome: impl Fn(&Configuration, &Configuration) -> Outcome,
+) -> Choice {
+    let order =
+        |&a: &usize, &b: &usize| least(&points[a]).total_cmp(&least(&points[b])).then(then(&points[a]).total_cmp(&then(&points[b])));
+    let reached: Vec<usize> = (0..points.len()).filter(|&index| points[index].is_finite() && by_value(&points[index])).collect();
+    let sure: Vec<usize> = reached.iter().copied().filter(|&index| shown(&points[index])).collect();
+    let Some(first) = sure.iter().copied().min_by(order) else {
+        return reached.into_iter().min_by(order).map_or(Choice::Nothing, Choice::Perhaps);
+    };
+    let close: Vec<usize> =
+        sure.into_iter().filter(|&index| index == first || outcome(&points[first], &points[index]) == Outcome::Tie).collect();
+    let other =
+        |&a: &usize, &b: &usize| then(&points[a]).total_cmp(&then(&points[b])).then(least(&points[a]).total_cmp(&least(&points[b])));
+    let index = close.iter().copied().min_by(other).unwrap_or(first);
+    Choice::Found { index, ties: close.into_iter().filter(|&one| one != index).collect() }
+}
+
+/// Configurations of one scene in the order of the rows: mean time and mean error over the seeds, so that no lucky seed is chosen. A configuration with a failed run, or
+/// with a value that is not finite, is left out: a mean over the runs that happened to end would flatter it.
 pub fn configurations(rows: &[SweepRow], scene: &str) -> Vec<Configuration> {
-    let mut found: Vec<Configuration> = Vec::new();
+    let mut groups: Vec<Vec<&SweepRow>> = Vec::new();
     for row in rows.iter().filter(|row| row.scene == scene) {
-        let (ms, error) = row.point();
-        match found.iter_mut().find(|one| one.variant == row.variant && one.parameters == row.parameters) {
-            Some(one) => {
-                one.ms += ms;
-                one.error += error;
-                one.count += 1;
-            }
-            None => {
-                found.push(Configuration { variant: row.variant.clone(), parameters: row.parameters.clone(), ms, error, count: 1 });
-            }
+        match groups.iter_mut().find(|group| group[0].variant == row.variant && group[0].parameters == row.parameters) {
+            Some(group) => group.push(row),
+            None => groups.push(vec![row]),
         }
     }
-    for one in &mut found {
-        one.ms /= one.count as f64;
-        one.error /= one.count as f64;
+    groups.iter().filter_map(|group| configuration(group)).filter(Configuration::is_finite).collect()
+}
+
+fn configuration(runs: &[&SweepRow]) -> Option<Configuration> {
+    if runs.iter().any(|run| run.failed.is_some()) {
+        return None;
     }
-    found.retain(|one| finite(one.point()));
-    found
+    let errors: Vec<&Sampled> = runs.iter().map(|run| run.error.as_ref()).collect::<Option<_>>()?;
+    let mean = errors.iter().map(|error| error.value).sum::<f64>() / errors.len() as f64;
+    let error = Sampled::mean(&errors).unwrap_or_else(|| Sampled {
+        value: mean,
+        replicates: errors.iter().map(|error| error.value).collect(),
+        replication: Replication::Means,
+    });
+    let ms = runs.iter().map(|run| run.ms).sum::<f64>() / runs.len() as f64;
+    // Runs are hours apart, rounds of one run are not: where there are enough runs, they tell more.
+    let times: Vec<f64> =
+        if runs.len() > 2 { runs.iter().map(|run| run.ms).collect() } else { runs.iter().flat_map(|run| run.round_ms.clone()).collect() };
+    let logarithm = Sampled { value: ms, replicates: times, replication: Replication::Means }.map(f64::ln);
+    let ms_error = logarithm.standard_error().map(|error| StandardError { size: error.size * ms, ..error });
+    let floors: Option<Vec<f64>> = runs.iter().map(|run| run.floor).collect();
+    let floor = floors.map(|floors| floors.iter().sum::<f64>() / runs.len() as f64);
+    Some(Configuration {
+        variant: runs[0].variant.clone(),
+        parameters: runs[0].parameters.clone(),
+        ms,
+        ms_error,
+        error,
+        floor,
+        count: runs.len(),
+    })
 }
 
 /// Configurations over all scenes: those that ended in every scene, with the mean time and the geometric mean of the error.
 ///
-/// Errors of scenes lie orders of magnitude apart, and an arithmetic mean would be the error of the hardest scene alone. A front
-/// over the bare rows of all scenes would only tell which scene is easy.
+/// Errors of scenes lie orders of magnitude apart, and an arithmetic mean would be the error of the hardest scene alone. A front over the bare rows of all scenes would
+/// only tell which scene is easy.
 pub fn overall(rows: &[SweepRow]) -> Vec<Configuration> {
     let scenes = scenes(rows);
-    let mut found: Vec<Configuration> = Vec::new();
+    let mut found: Vec<Vec<Configuration>> = Vec::new();
     for scene in &scenes {
         for one in configurations(rows, scene) {
-            match found.iter_mut().find(|other| other.variant == one.variant && other.parameters == one.parameters) {
-                Some(other) => {
-                    other.ms += one.ms;
-                    other.error += one.error.ln();
-                    other.count += 1;
-                }
-                None => found.push(Configuration { error: one.error.ln(), count: 1, ..one }),
+            match found.iter_mut().find(|group| group[0].variant == one.variant && group[0].parameters == one.parameters) {
+                Some(group) => group.push(one),
+                None => found.push(vec![one]),
             }
         }
     }
-    found.retain(|one| one.count == scenes.len());
-    for one in &mut found {
-        one.ms /= one.count as f64;
-        one.error = (one.error / one.count as f64).exp();
+    found.retain(|group| group.len() == scenes.len());
+    found.iter().map(|group| over_scenes(group)).filter(Configuration::is_finite).collect()
+}
+
+fn over_scenes(group: &[Configuration]) -> Configuration {
+    let count = group.len() as f64;
+    let logarithms: Vec<Sampled> = group.iter().map(|one| one.error.map(f64::ln)).collect();
+    let mean = logarithms.iter().map(|one| one.value).sum::<f64>() / count;
+    let error = Sampled::mean(&logarithms.iter().collect::<Vec<_>>()).unwrap_or_else(|| Sampled::alone(mean)).map(f64::exp);
+    let errors: Option<Vec<StandardError>> = group.iter().map(|one| one.ms_error).collect();
+    let sum = errors.and_then(|errors| errors.into_iter().reduce(StandardError::with));
+    let floors: Option<Vec<f64>> = group.iter().map(|one| one.floor.map(f64::ln)).collect();
+    Configuration {
+        ms: group.iter().map(|one| one.ms).sum::<f64>() / count,
+        ms_error: sum.map(|error| StandardError { size: error.size / count, ..error }),
+        error,
+        floor: floors.map(|floors| (floors.iter().sum::<f64>() / count).exp()),
+        count: group.len(),
+        ..group[0].clone()
     }
-    found
 }
 
 /// Names of the scenes, in the order of the rows.
@@ -124,86 +257,5 @@ pub(crate) fn scenes(rows: &[SweepRow]) -> Vec<&str> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::{cheapest_under_error, configurations, most_accurate_under_time, overall, pareto_front};
-    use crate::data::SweepRow;
-
-    const POINTS: [(f64, f64); 8] = [
-        (4.0, 0.10),      // on the front
-        (1.0, 0.50),      // on the front
-        (2.0, 0.50),      // slower than 1, as accurate
-        (4.0, 0.30),      // as fast as 0, less accurate
-        (f64::NAN, 0.01), // no time
-        (0.5, f64::NAN),  // no error
-        (9.0, 0.02),      // on the front
-        (0.1, f64::INFINITY),
-    ];
-
-    #[test]
-    fn the_front_holds_what_nothing_beats_by_rising_time() {
-        assert_eq!(pareto_front(&POINTS), [1, 0, 6]);
-        assert_eq!(pareto_front(&[(1.0, 1.0), (1.0, 1.0), (1.0, 2.0)]), [0, 1]);
-        assert!(pareto_front(&[(f64::NAN, f64::NAN)]).is_empty());
-        assert!(pareto_front(&[]).is_empty());
-    }
-
-    #[test]
-    fn the_front_is_what_comparing_all_pairs_gives() {
-        let points: Vec<(f64, f64)> = (0..60u32).map(|k| (f64::from(k * 37 % 11), f64::from(k * 53 % 13))).collect();
-        let beats = |a: (f64, f64), b: (f64, f64)| a.0 <= b.0 && a.1 <= b.1 && a != b;
-        let mut expected: Vec<usize> = (0..points.len()).filter(|&b| !points.iter().any(|&a| beats(a, points[b]))).collect();
-        let mut front = pareto_front(&points);
-        front.sort_unstable();
-        expected.sort_unstable();
-        assert_eq!(front, expected);
-    }
-
-    #[test]
-    fn targets_choose_the_cheapest_and_the_most_accurate() {
-        assert_eq!(cheapest_under_error(&POINTS, 0.3), Some(0), "of two at 4 ms, the more accurate");
-        assert_eq!(cheapest_under_error(&POINTS, 0.5), Some(1));
-        assert_eq!(cheapest_under_error(&POINTS, 0.05), Some(6));
-        assert_eq!(cheapest_under_error(&POINTS, 0.015), None, "the point without a time must not be chosen");
-        assert_eq!(most_accurate_under_time(&POINTS, 3.0), Some(1), "of two at 0.5, the faster");
-        assert_eq!(most_accurate_under_time(&POINTS, 4.0), Some(0));
-        assert_eq!(most_accurate_under_time(&POINTS, 0.7), None, "points without an error must not be chosen");
-        assert_eq!(most_accurate_under_time(&POINTS, f64::NAN), None);
-    }
-
-    fn row(scene: &str, samples: u32, seed: u64, ms: f64, error: f64) -> SweepRow {
-        let parameters = vec![("samples".to_owned(), samples.to_string())];
-        SweepRow { scene: scene.to_owned(), variant: "v".to_owned(), parameters, seed, ms, error, failed: None }
-    }
-
-    #[test]
-    fn a_failed_row_is_never_chosen_whatever_its_values() {
-        let mut rows = [row("hall", 1, 0, 5.0, 0.5), row("hall", 2, 0, 0.1, 0.0)];
-        rows[1].failed = Some("device lost".to_owned());
-        let points: Vec<(f64, f64)> = rows.iter().map(SweepRow::point).collect();
-        assert_eq!(pareto_front(&points), [0]);
-        assert_eq!(cheapest_under_error(&points, 1.0), Some(0));
-        assert_eq!(most_accurate_under_time(&points, 10.0), Some(0));
-    }
-
-    #[test]
-    fn seeds_are_averaged_and_one_failed_seed_takes_the_configuration_out() {
-        let mut rows =
-            vec![row("hall", 1, 0, 4.0, 0.1), row("hall", 2, 0, 8.0, 0.1), row("hall", 1, 1, 6.0, 0.3), row("hall", 2, 1, 8.0, 0.1)];
-        rows[3].failed = Some("lost".to_owned());
-        let found = configurations(&rows, "hall");
-        assert_eq!(found.len(), 1);
-        assert_eq!((found[0].ms, found[0].count), (5.0, 2));
-        assert!((found[0].error - 0.2).abs() < 1e-12);
-    }
-
-    #[test]
-    fn overall_needs_every_scene_and_takes_the_geometric_mean() {
-        let rows = [row("hall", 1, 0, 4.0, 0.01), row("yard", 1, 0, 6.0, 1.0), row("hall", 2, 0, 1.0, 0.01)];
-        let found = overall(&rows);
-        assert_eq!(found.len(), 1);
-        assert_eq!((found[0].ms, found[0].count), (5.0, 2));
-        assert!((found[0].error - 0.1).abs() < 1e-12);
-        let exact = overall(&[row("hall", 1, 0, 4.0, 0.0), row("yard", 1, 0, 6.0, 1.0)]);
-        assert_eq!(exact[0].error, 0.0);
-    }
-}
+#[path = "choice_tests.rs"]
+mod tests;

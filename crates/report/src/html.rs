@@ -4,7 +4,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
 
-use crate::data::Picture;
+use crate::data::{Measurement, Picture, Time};
 
 /// Text for an element or for an attribute in quotes.
 pub(crate) fn escape(text: &str) -> String {
@@ -51,7 +51,35 @@ pub(crate) fn json<T: Serialize>(value: &T) -> String {
 }
 
 pub(crate) fn data_uri(picture: &Picture) -> String {
-    format!("data:image/png;base64,{}", STANDARD.encode(&picture.png))
+    base64(&picture.png)
+}
+
+/// A PNG file as an address.
+pub(crate) fn base64(png: &[u8]) -> String {
+    format!("data:image/png;base64,{}", STANDARD.encode(png))
+}
+
+/// Bytes as mebibytes.
+pub(crate) fn mebibytes(bytes: u64) -> f64 {
+    bytes as f64 / f64::from(1u32 << 20)
+}
+
+/// The value of a parameter, as a graph would have it.
+pub(crate) fn parameter(value: &serde_json::Value) -> String {
+    match value {
+        serde_json::Value::String(text) => text.clone(),
+        serde_json::Value::Null => "none".to_owned(),
+        // Single floats: their shortest digits, not those of the double that holds them.
+        serde_json::Value::Number(number) if number.is_f64() => {
+            number.as_f64().map_or_else(|| number.to_string(), |value| format!("{}", value as f32))
+        }
+        other => other.to_string(),
+    }
+}
+
+/// Parameters of a pass as (name, value); empty where it has none.
+pub(crate) fn parameters(value: &serde_json::Value) -> Vec<(String, String)> {
+    value.as_object().into_iter().flatten().map(|(name, value)| (name.clone(), parameter(value))).collect()
 }
 
 /// Three significant digits, plain where that is readable; "not a number" and "infinite" in words.
@@ -100,6 +128,33 @@ pub(crate) fn raised(exponent: &str) -> String {
 /// `number` with its unit, or only the words where it is not finite.
 pub(crate) fn with_unit(value: f64, unit: &str) -> String {
     if value.is_finite() { format!("{} {unit}", number(value)) } else { number(value) }
+}
+
+/// `value (low to high)`; the value alone where its interval is not known or is a point.
+pub(crate) fn value_with_interval(found: &Measurement) -> String {
+    match interval(found.low, found.high) {
+        Some(interval) => format!("{} ({interval})", number(found.value)),
+        None => number(found.value),
+    }
+}
+
+/// `low to high`; none where that is not known or is a point.
+pub(crate) fn interval(low: Option<f64>, high: Option<f64>) -> Option<String> {
+    let (low, high) = low.zip(high)?;
+    // Digits enough to tell both ends apart.
+    let (mut a, mut b) = (number(low), number(high));
+    if a == b && low != high {
+        (a, b) = (format!("{low:.5}").replace('-', "−"), format!("{high:.5}").replace('-', "−"));
+    }
+    (a != b).then(|| format!("{a} to {b}"))
+}
+
+/// A time with its unit and its interval.
+pub(crate) fn time_with_interval(time: &Time) -> String {
+    match interval(time.low, time.high) {
+        Some(interval) => format!("{} ({interval})", with_unit(time.median, "ms")),
+        None => with_unit(time.median, "ms"),
+    }
 }
 
 /// A fraction as percent with its sign.

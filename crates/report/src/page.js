@@ -7,6 +7,83 @@
   const find = (id) => document.getElementById(id);
   const data = JSON.parse(find("data").textContent);
   const section = find("viewer");
+
+  // --- Radiance, and how it is brought to a display: twins of the functions of the same names in crates/lobes/src/tonemap.rs. ---
+
+  const clamp = (value, low, high) => Math.min(high, Math.max(low, value));
+  const rows = (m, r, g, b) => m.map((row) => row[0] * r + row[1] * g + row[2] * b);
+  const ACES_IN = [[0.59719, 0.35458, 0.04823], [0.076, 0.90834, 0.01566], [0.0284, 0.13383, 0.83777]];
+  const ACES_OUT = [[1.60475, -0.53108, -0.07367], [-0.10208, 1.10813, -0.00605], [-0.00327, -0.07276, 1.07602]];
+  const AGX_IN = [
+    [0.842479062253094, 0.0784335999999992, 0.0792237451477643],
+    [0.0423282422610123, 0.878468636469772, 0.0791661274605434],
+    [0.0423756549057051, 0.0784336, 0.879142973793104],
+  ];
+  const AGX_OUT = [
+    [1.19687900512017, -0.0980208811401368, -0.0990297440797205],
+    [-0.0528968517574562, 1.15190312990417, -0.0989611768448433],
+    [-0.0529716355144438, -0.0980434501171241, 1.15107367264116],
+  ];
+  const CURVES = {
+    none: (r, g, b) => [r, g, b],
+    aces: (r, g, b) => rows(ACES_OUT, ...rows(ACES_IN, r, g, b).map((c) => (c * (c + 0.0245786) - 0.000090537) / (c * (0.983729 * c + 0.432951) + 0.238081))),
+    agx: (r, g, b) => {
+      const curved = rows(AGX_IN, r, g, b).map((value) => {
+        const x = clamp((Math.log2(Math.max(value, 1e-10)) + 12.47393) / 16.5, 0, 1), x2 = x * x, x4 = x2 * x2;
+        return 15.5 * x4 * x2 - 40.14 * x4 * x + 31.96 * x4 - 6.868 * x2 * x + 0.4298 * x2 + 0.1191 * x - 0.00232;
+      });
+      return rows(AGX_OUT, ...curved).map((value) => clamp(value, 0, 1) ** 2.2);
+    },
+  };
+  const encode = (linear) => (linear <= 0.0031308 ? 12.92 * linear : 1.055 * linear ** (1 / 2.4) - 0.055);
+  /** sRGB bytes of linear values, fine enough that none is a level off. */
+  const BYTES = Uint8ClampedArray.from({ length: 65536 }, (_, index) => Math.round(255 * encode(index / 65535)));
+  const MAX_INPUT = 1e6;
+
+  /** RGB triples of a picture whose lower half holds exponents. */
+  function decodeRadiance(image) {
+    const width = image.naturalWidth, height = image.naturalHeight / 2;
+    const canvas = Object.assign(document.createElement("canvas"), { width, height: 2 * height });
+    const context = canvas.getContext("2d", { willReadFrequently: true });
+    context.drawImage(image, 0, 0);
+    const bytes = context.getImageData(0, 0, width, 2 * height).data, count = width * height;
+    const values = new Float32Array(3 * count);
+    for (let index = 0; index < count; index += 1) {
+      const exponent = bytes[4 * (index + count)];
+      const scale = exponent === 0 ? 0 : 2 ** (exponent - 128 - 8);
+      for (let channel = 0; channel < 3; channel += 1) values[3 * index + channel] = bytes[4 * index + channel] * scale;
+    }
+    return { width, height, values };
+  }
+
+  const held = new Map();
+  /** The radiance of a picture by its key; null where it has not loaded. */
+  function radianceOf(key) {
+    if (!held.has(key)) {
+      const image = find(`radiance-${key}`);
+      if (!image || !image.complete || !image.naturalWidth) return null;
+      held.set(key, decodeRadiance(image));
+    }
+    return held.get(key);
+  }
+
+  const view = { curve: data.view ? data.view.curve : "agx", exposure: data.view ? data.view.exposure : 0 };
+  /** Draws a picture at the present exposure. */
+  function expose(key) {
+    const radiance = radianceOf(key), canvas = find(`picture-${key}-picture`);
+    if (!radiance || !canvas) return;
+    const { width, height, values } = radiance;
+    const shown = new ImageData(width, height), scale = 2 ** view.exposure, curve = CURVES[view.curve] || CURVES.none;
+    for (let index = 0; index < width * height; index += 1) {
+      const at = 3 * index;
+      const mapped = curve(Math.min(values[at] * scale, MAX_INPUT), Math.min(values[at + 1] * scale, MAX_INPUT), Math.min(values[at + 2] * scale, MAX_INPUT));
+      for (let channel = 0; channel < 3; channel += 1) shown.data[4 * index + channel] = BYTES[Math.round(65535 * clamp(mapped[channel], 0, 1))];
+      shown.data[4 * index + 3] = 255;
+    }
+    canvas.getContext("2d", { willReadFrequently: true }).putImageData(shown, 0, 0);
+  }
+  const keys = data.variants ? ["reference", ...data.variants.map((_, index) => String(index))] : [];
+
   const viewer = section ? makeViewer() : null;
   if (location.hash === "#selftest") window.addEventListener("load", () => selftest());
 
@@ -15,7 +92,7 @@
     const canvas = find("canvas"), handle = find("handle"), stage = find("stage");
     const context = canvas.getContext("2d", { willReadFrequently: location.hash === "#selftest" });
     const pixel = Object.assign(document.createElement("canvas"), { width: 1, height: 1 }).getContext("2d", { willReadFrequently: true });
-    const sides = [{ key: "reference", name: "Reference", size: data.reference }];
+    const sides = [{ key: "reference", name: "Reference", size: data.reference.picture }];
     data.variants.forEach((variant, index) => sides.push({ key: String(index), name: variant.name, size: variant.picture }));
     const last = sides.length - 1;
     const state = { a: last > 1 ? 1 : 0, b: last > 1 ? 2 : last, layer: "picture", mode: "wipe", wipe: 0.5, zoom: 0, x: 0, y: 0 };
@@ -28,6 +105,8 @@
       if (map || state.layer === "picture") return { image: map, words: side.name };
       return { image: element(side, "picture"), words: `${side.name} (no such map: picture)` };
     }
+    /** Canvases are always ready, images once they have loaded. */
+    const ready = (image) => image && (image.naturalWidth === undefined ? image.width : image.naturalWidth) > 0;
     const paneWidth = () => (state.mode === "side" ? canvas.width / 2 : canvas.width);
     const fitting = () => Math.min(paneWidth() / size().width, canvas.height / size().height);
     const zoom = () => state.zoom || fitting();
@@ -44,7 +123,7 @@
 
     function drawPane(side, left, clipFrom, clipTo) {
       const { image } = shown(side);
-      if (!image || !image.naturalWidth || clipTo <= clipFrom) return;
+      if (!ready(image) || clipTo <= clipFrom) return;
       const scale = zoom();
       context.save();
       context.beginPath();
@@ -75,7 +154,7 @@
       handle.setAttribute("aria-valuetext", `${Math.round(state.wipe * 100)} % ${a.name}, the rest ${b.name}`);
       find("name-a").textContent = `A: ${shown(a).words}`;
       find("name-b").textContent = `B: ${shown(b).words}`;
-      find("zoom").textContent = `${(zoom() * 100).toPrecision(3)} %`;
+      find("zoom").textContent = `${Math.round(zoom() * 100)} %`;
       canvas.setAttribute("aria-label", `${state.layer} of ${a.name} and of ${b.name}, ${state.mode === "side" ? "side by side" : "with a wipe"}`);
       for (const name of ["mode", "layer"]) {
         for (const button of section.querySelectorAll(`[data-${name}]`)) {
@@ -139,10 +218,15 @@
         return;
       }
       const words = ["a", "b"].map((name) => {
-        const { image } = shown(sides[state[name]]);
-        return image && image.naturalWidth ? `${name.toUpperCase()} ${colour(image, x, y).join(" ")}` : `${name.toUpperCase()} missing`;
+        const side = sides[state[name]], { image } = shown(side), radiance = radianceOf(side.key);
+        if (!ready(image)) return `${name.toUpperCase()} missing`;
+        const as = colour(image, x, y).join(" ");
+        if (state.layer !== "picture" || !radiance) return `${name.toUpperCase()} ${as}`;
+        const values = [0, 1, 2].map((channel) => Number(radiance.values[3 * (y * radiance.width + x) + channel].toPrecision(2)));
+        return `${name.toUpperCase()} ${values.join(" ")} (shown ${as})`;
       });
-      find("readout").textContent = `x ${x}, y ${y} (from the upper left) · ${words.join(" · ")} (RGB as shown, of 255)`;
+      const unit = state.layer === "picture" ? "radiance RGB to about 1 %, and as shown, of 255" : "RGB as shown, of 255";
+      find("readout").textContent = `x ${x}, y ${y} (from the upper left) · ${words.join(" · ")} · ${unit}`;
     }
 
     /** Follows the pointer from its press to its release. A pointer that cannot be captured is followed all the same. */
@@ -161,7 +245,7 @@
       for (const end of ["pointerup", "pointercancel"]) target.addEventListener(end, () => { from = null; });
     }
 
-    function keys(target, actions) {
+    function onKeys(target, actions) {
       target.addEventListener("keydown", (event) => {
         const action = event.ctrlKey || event.metaKey || event.altKey ? null : actions[event.key];
         if (!action) return;
@@ -201,28 +285,62 @@
     canvas.addEventListener("pointermove", read);
     drag(canvas, (to, from) => move((from[0] - to[0]) / zoom(), (from[1] - to[1]) / zoom()));
     drag(handle, (to) => setWipe(to[0] / canvas.width));
-    keys(handle, {
+    onKeys(handle, {
       ArrowLeft: (times) => setWipe(state.wipe - 0.01 * times), ArrowRight: (times) => setWipe(state.wipe + 0.01 * times),
       ArrowDown: (times) => setWipe(state.wipe - 0.01 * times), ArrowUp: (times) => setWipe(state.wipe + 0.01 * times),
       PageDown: () => setWipe(state.wipe - 0.1), PageUp: () => setWipe(state.wipe + 0.1), Home: () => setWipe(0), End: () => setWipe(1),
     });
     const step = (times) => 24 * times / zoom();
-    keys(canvas, {
+    onKeys(canvas, {
       ArrowLeft: (times) => move(-step(times), 0), ArrowRight: (times) => move(step(times), 0),
       ArrowUp: (times) => move(0, -step(times)), ArrowDown: (times) => move(0, step(times)),
       "+": closer, "=": closer, "-": farther, 0: fit, 1: one,
     });
+    // All pictures of the page follow the exposure: the two that are looked at at once, the others when there is time.
+    let waiting = 0;
+    function setView(changes, all = false) {
+      Object.assign(view, changes);
+      find("curve").value = view.curve;
+      find("exposure").value = view.exposure;
+      find("stops").textContent = `${view.exposure >= 0 ? "+" : "−"}${Math.abs(view.exposure).toFixed(2)} stops`;
+      find("exposure").setAttribute("aria-valuetext", find("stops").textContent);
+      const first = [sides[state.a].key, sides[state.b].key];
+      for (const key of all ? keys : first) expose(key);
+      clearTimeout(waiting);
+      if (!all) waiting = setTimeout(() => keys.filter((key) => !first.includes(key)).forEach(expose), 120);
+      draw();
+    }
+    const own = () => {
+      const graphs = [state.a, state.b].map((index) => data.variants[index - 1]);
+      const graph = graphs.find((variant) => variant && variant.tone) || data.variants.find((variant) => variant.tone);
+      return graph ? graph.tone : null;
+    };
+    function middleGrey() {
+      const { values } = radianceOf("reference") || { values: [] };
+      let sum = 0;
+      for (let at = 0; at < values.length; at += 3) sum += 0.2126 * values[at] + 0.7152 * values[at + 1] + 0.0722 * values[at + 2];
+      if (sum > 0) setView({ exposure: clamp(Math.log2(0.18 * values.length / 3 / sum), -20, 20) });
+    }
+    find("as-graph").disabled = !own();
+    find("curve").addEventListener("change", (event) => setView({ curve: event.target.value }));
+    find("exposure").addEventListener("input", (event) => setView({ exposure: Number(event.target.value) }));
+    find("darker").addEventListener("click", () => setView({ exposure: clamp(view.exposure - 1, -20, 20) }));
+    find("brighter").addEventListener("click", () => setView({ exposure: clamp(view.exposure + 1, -20, 20) }));
+    find("as-graph").addEventListener("click", () => setView({ curve: own().curve, exposure: own().exposure }));
+    find("auto").addEventListener("click", middleGrey);
+    find("exposure").step = "any";
     window.addEventListener("resize", resize);
-    window.addEventListener("load", resize);
+    window.addEventListener("load", () => { setView({}, true); resize(); });
     centre();
     resize();
-    return { state, canvas, context, handle, sides, shown, toPicture, colour, zoomTo, zoom, draw };
+    return { setView, own, state, canvas, context, handle, sides, shown, toPicture, colour, zoomTo, zoom, draw };
   }
 
   /**
    * Works the page as a person would and writes what failed into an element; run by adding #selftest to the address. It runs in
    * one piece on load: a browser without a window may write the page out before anything later ends.
    */
+  let tones = [];
   function selftest() {
     const expect = (condition, words) => { if (!condition) failures.push(words); };
     const images = [...document.images];
@@ -240,7 +358,11 @@
     }
     const plots = [...document.querySelectorAll(".plots svg")];
     for (const plot of plots) expect(plot.getBoundingClientRect().width > 100, "a plot has no size");
-    const result = { ok: failures.length === 0, images: images.length, plots: plots.length, distinct, failures };
+    const wide = document.documentElement.scrollWidth > window.innerWidth;
+    expect(!wide, `the page is ${document.documentElement.scrollWidth} pixels wide in a window of ${window.innerWidth}`);
+    const table = document.querySelector("table.metrics");
+    const inside = table ? table.getBoundingClientRect().right <= window.innerWidth : true;
+    const result = { ok: failures.length === 0, images: images.length, plots: plots.length, distinct, tones, inside, failures };
     const output = Object.assign(document.createElement("output"), { id: "selftest", textContent: JSON.stringify(result) });
     document.body.append(output);
     document.title = result.ok ? "selftest passed" : "selftest failed";
@@ -248,7 +370,7 @@
 
   /** Returns at how many places two different colours were told apart. */
   function workViewer(expect) {
-    const { state, canvas, context, handle, sides, shown, toPicture, colour, zoomTo, zoom } = viewer;
+    const { state, canvas, context, handle, sides, shown, toPicture, colour, zoomTo, zoom, setView, own } = viewer;
     let distinct = 0;
     const press = (target, key) => target.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true, cancelable: true }));
     const pointer = (target, type, share) => {
@@ -291,6 +413,21 @@
       holds(0.8, "b", `${layer}, side by side`);
       find("zoom-fit").click();
     }
+    // What the exposure does to pixels of the reference, for whoever knows what they hold.
+    setView({}, true);
+    const place = find("picture-reference-picture").getContext("2d", { willReadFrequently: true });
+    const pixels = (curve, exposure) => {
+      setView({ curve, exposure }, true);
+      return [0, 1, 2, 3].map((x) => [...place.getImageData(x, 0, 1, 1).data].slice(0, 3));
+    };
+    tones = ["agx", "aces", "none"].map((curve) => [-3, 0, 4].map((exposure) => pixels(curve, exposure)));
+    find("exposure").value = "1.5";
+    find("exposure").dispatchEvent(new Event("input"));
+    expect(view.exposure === 1.5 && find("stops").textContent === "+1.50 stops", "the slider does not set the exposure");
+    find("as-graph").click();
+    const tone = own();
+    expect(!tone || (view.curve === tone.curve && view.exposure === tone.exposure), "the graph's own curve is not taken");
+    setView({ curve: data.view.curve, exposure: data.view.exposure }, true);
     const before = zoom();
     canvas.dispatchEvent(new WheelEvent("wheel", { deltaY: -120, clientX: 40, clientY: 40, cancelable: true }));
     expect(zoom() > before, "the wheel does not zoom");

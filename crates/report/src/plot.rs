@@ -1,12 +1,13 @@
 //! Error against time as an SVG, both axes logarithmic. Axes and labels take the text colour of the page, points the colour of
 //! their variant, so that one plot is legible on light and on dark.
 
+use lobelia_measure::sampled::Interval;
 use plotters::backend::SVGBackend;
 use plotters::coord::Shift;
 use plotters::drawing::{DrawingArea, IntoDrawingArea};
 use plotters::element::{Circle, PathElement, Polygon, Text};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters::style::{Color, FontTransform, IntoFont, RGBColor, ShapeStyle, TextStyle};
+use plotters::style::{Color, FontTransform, IntoFont, RGBAColor, RGBColor, ShapeStyle, TextStyle};
 
 use crate::choice::Configuration;
 use crate::html::raised;
@@ -93,28 +94,48 @@ fn tick_label(value: f64) -> String {
     }
 }
 
-/// Targets that the reader named, drawn as dashed lines.
+/// Lines that are no points.
 #[derive(Clone, Copy, Default)]
-pub(crate) struct Targets {
+pub(crate) struct Lines {
+    /// Target of the error, drawn dashed.
     pub error: Option<f64>,
+    /// Target of the time, drawn dashed.
     pub ms: Option<f64>,
+    /// The error that the noise of the reference alone makes, drawn dotted with its name.
+    pub floor: Option<f64>,
+}
+
+/// What is written beside a point: its number, and what sets it apart from the others.
+pub(crate) struct Label {
+    pub number: usize,
+    pub words: String,
 }
 
 /// The plot of some configurations. `front` are the indices of the Pareto front by rising time; `variants` are the names that
-/// choose colours and shapes.
+/// choose colours and shapes; `labels` has one for each point. Points on the front have their whole label, others their number.
 pub(crate) fn plot(
     points: &[Configuration],
     front: &[usize],
+    labels: &[Label],
     variants: &[&str],
-    metric: &str,
-    targets: Targets,
+    title: &str,
+    lines: Lines,
 ) -> Result<String, PlotError> {
-    let x = Axis::new(points.iter().map(|point| point.ms).chain(targets.ms), LEFT, RIGHT);
-    let y = Axis::new(points.iter().map(|point| point.error).chain(targets.error), BOTTOM, TOP);
+    let ends = |interval: Option<Interval>| interval.into_iter().flat_map(|interval| [interval.low, interval.high]);
+    let times = points
+        .iter()
+        .flat_map(|point| ends(point.ms_interval()).chain([point.ms]).filter(|ms| *ms > 0.2 * point.ms && *ms < 5.0 * point.ms));
+    let errors = points.iter().flat_map(|point| {
+        let value = point.error.value;
+        ends(point.error_interval()).chain([value]).filter(move |error| *error > 0.2 * value && *error < 5.0 * value)
+    });
+    let x = Axis::new(times.chain(lines.ms), LEFT, RIGHT);
+    let y = Axis::new(errors.chain(lines.error).chain(lines.floor), BOTTOM, TOP);
     let mut svg = String::new();
     let drawn = {
         let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
-        draw(&area, &x, &y, points, front, variants, metric, targets).and_then(|()| area.present())
+        let frame = draw_frame(&area, &x, &y, title, lines);
+        frame.and_then(|()| draw_points(&area, &x, &y, points, front, labels, variants)).and_then(|()| area.present())
     };
     drawn.map_err(|error| PlotError(error.to_string()))?;
     Ok(dress(&svg))
@@ -122,17 +143,8 @@ pub(crate) fn plot(
 
 type Drawn = Result<(), plotters::drawing::DrawingAreaErrorKind<std::io::Error>>;
 
-#[expect(clippy::too_many_arguments, reason = "one call, from the function above")]
-fn draw(
-    area: &Area,
-    x: &Axis,
-    y: &Axis,
-    points: &[Configuration],
-    front: &[usize],
-    variants: &[&str],
-    metric: &str,
-    targets: Targets,
-) -> Drawn {
+/// Axes, their names, and lines that are no points.
+fn draw_frame(area: &Area, x: &Axis, y: &Axis, title: &str, lines: Lines) -> Drawn {
     let faint = ShapeStyle { color: INK.mix(0.13), filled: false, stroke_width: 2 };
     let strong = ShapeStyle { color: INK.mix(0.7), filled: false, stroke_width: 3 };
     for (value, label) in x.ticks() {
@@ -152,15 +164,24 @@ fn draw(
     line(area, (LEFT, BOTTOM), (RIGHT, BOTTOM), strong)?;
     line(area, (LEFT, TOP), (LEFT, BOTTOM), strong)?;
     text(area, "Frame time [ms]", ((LEFT + RIGHT) / 2.0, BOTTOM + 66.0), HPos::Center, VPos::Top, FontTransform::None)?;
-    let error = format!("Error: {metric}");
+    let error = format!("Error: {title}");
     text(area, &error, (26.0, (TOP + BOTTOM) / 2.0), HPos::Center, VPos::Center, FontTransform::Rotate270)?;
-    if let Some(ms) = targets.ms.filter(|ms| *ms > 0.0 && ms.is_finite()) {
-        dashes(area, (x.place(ms), TOP), (x.place(ms), BOTTOM))?;
+    let drawable = |value: Option<f64>| value.filter(|value| *value > 0.0 && value.is_finite());
+    if let Some(ms) = drawable(lines.ms) {
+        dashes(area, (x.place(ms), TOP), (x.place(ms), BOTTOM), 24.0)?;
     }
-    if let Some(error) = targets.error.filter(|error| *error > 0.0 && error.is_finite()) {
-        dashes(area, (LEFT, y.place(error)), (RIGHT, y.place(error)))?;
+    if let Some(error) = drawable(lines.error) {
+        dashes(area, (LEFT, y.place(error)), (RIGHT, y.place(error)), 24.0)?;
     }
-    let place = |index: usize| (x.place(points[index].ms), y.place(points[index].error));
+    if let Some(floor) = drawable(lines.floor) {
+        dashes(area, (LEFT, y.place(floor)), (RIGHT, y.place(floor)), 8.0)?;
+        text(area, "noise of the reference", (RIGHT - 8.0, y.place(floor) - 6.0), HPos::Right, VPos::Bottom, FontTransform::None)?;
+    }
+    Ok(())
+}
+
+fn draw_points(area: &Area, x: &Axis, y: &Axis, points: &[Configuration], front: &[usize], labels: &[Label], variants: &[&str]) -> Drawn {
+    let place = |index: usize| (x.place(points[index].ms), y.place(points[index].error.value));
     // Steps: between two points of the front the faster one is the best there is.
     let ink = ShapeStyle { color: INK.mix(0.55), filled: false, stroke_width: 4 };
     for pair in front.windows(2) {
@@ -172,11 +193,52 @@ fn draw(
     let order = (0..points.len()).filter(|&index| !is_front(index)).chain(front.iter().copied());
     for index in order {
         let variant = variants.iter().position(|name| *name == points[index].variant).unwrap_or(0);
+        let (at, opacity) = (place(index), if is_front(index) { 1.0 } else { 0.5 });
+        error_bars(area, x, y, &points[index], tint(variant).mix(opacity))?;
         if is_front(index) {
-            area.draw(&Circle::new(whole(place(index)), 22, ShapeStyle { color: INK.to_rgba(), filled: false, stroke_width: 4 }))?;
-            marker(area, place(index), variant, 13.0, 1.0)?;
+            area.draw(&Circle::new(whole(at), 22, ShapeStyle { color: INK.to_rgba(), filled: false, stroke_width: 4 }))?;
+            marker(area, at, variant, 13.0, 1.0)?;
         } else {
-            marker(area, place(index), variant, 11.0, 0.5)?;
+            marker(area, at, variant, 11.0, 0.5)?;
+        }
+    }
+    // Labels last, so that nothing lies over them; the front's are whole.
+    for (index, label) in labels.iter().enumerate().take(points.len()) {
+        if !is_front(index) && points.len() > MOST_NUMBERS {
+            continue;
+        }
+        let (px, py) = place(index);
+        let words = if is_front(index) && !label.words.is_empty() {
+            format!("{}: {}", label.number, label.words)
+        } else {
+            label.number.to_string()
+        };
+        let (at, across) = if px > 0.6 * RIGHT { ((px - 24.0, py - 20.0), HPos::Right) } else { ((px + 24.0, py - 20.0), HPos::Left) };
+        text(area, &words, at, across, VPos::Bottom, FontTransform::None)?;
+    }
+    Ok(())
+}
+
+/// More points than this have numbers on the front alone: others would hide each other.
+const MOST_NUMBERS: usize = 60;
+
+/// 95 % intervals of time and error, cut at the axes.
+fn error_bars(area: &Area, x: &Axis, y: &Axis, point: &Configuration, colour: RGBAColor) -> Drawn {
+    let style = ShapeStyle { color: colour, filled: false, stroke_width: 3 };
+    let (px, py) = (x.place(point.ms), y.place(point.error.value));
+    let inside = |place: f64, from: f64, to: f64| place.clamp(from.min(to), from.max(to));
+    if let Some(interval) = point.ms_interval() {
+        let (low, high) = (inside(x.place(interval.low), LEFT, RIGHT), inside(x.place(interval.high), LEFT, RIGHT));
+        line(area, (low, py), (high, py), style)?;
+        for end in [low, high] {
+            line(area, (end, py - 8.0), (end, py + 8.0), style)?;
+        }
+    }
+    if let Some(interval) = point.error_interval() {
+        let (low, high) = (inside(y.place(interval.low), TOP, BOTTOM), inside(y.place(interval.high), TOP, BOTTOM));
+        line(area, (px, low), (px, high), style)?;
+        for end in [low, high] {
+            line(area, (px - 8.0, end), (px + 8.0, end), style)?;
         }
     }
     Ok(())
@@ -190,16 +252,16 @@ fn line(area: &Area, from: (f64, f64), to: (f64, f64), style: ShapeStyle) -> Dra
     area.draw(&PathElement::new(vec![whole(from), whole(to)], style))
 }
 
-fn dashes(area: &Area, from: (f64, f64), to: (f64, f64)) -> Drawn {
+fn dashes(area: &Area, from: (f64, f64), to: (f64, f64), period: f64) -> Drawn {
     let style = ShapeStyle { color: INK.mix(0.8), filled: false, stroke_width: 3 };
     let length = (to.0 - from.0).hypot(to.1 - from.1);
     let at = |distance: f64| {
         let share = (distance / length).min(1.0);
         (from.0 + (to.0 - from.0) * share, from.1 + (to.1 - from.1) * share)
     };
-    for dash in 0..(length / 24.0).ceil() as u32 {
-        let start = f64::from(dash) * 24.0;
-        line(area, at(start), at(start + 12.0), style)?;
+    for dash in 0..(length / period).ceil() as u32 {
+        let start = f64::from(dash) * period;
+        line(area, at(start), at(start + 0.5 * period), style)?;
     }
     Ok(())
 }

@@ -1,11 +1,15 @@
 //! The page of a sweep.
 
-use crate::choice::{Configuration, cheapest_under_error, configurations, most_accurate_under_time, overall, pareto_front, scenes};
-use crate::data::Sweep;
-use crate::html::{escape, json, number, pairs_line, with_unit};
+use std::collections::BTreeMap;
+
+use crate::choice::{Choice, Configuration, cheapest_under_error, configurations, most_accurate_under_time, overall, pareto_front, scenes};
+use crate::direction::Direction;
+use crate::html::{escape, interval, json, number, pairs_line, parameter, with_unit};
 use crate::light::light_box;
+use crate::metric::Metric;
 use crate::page::whole_page;
-use crate::plot::{Targets, plot, shape};
+use crate::plot::{Label, Lines, plot, shape};
+use crate::sweep_data::{Sweep, plotted_title};
 
 /// One plot with its answers: a scene, or all of them.
 struct Part {
@@ -13,6 +17,8 @@ struct Part {
     note: String,
     points: Vec<Configuration>,
     front: Vec<usize>,
+    /// One for each point: those on the front have the first numbers, by rising time.
+    labels: Vec<Label>,
 }
 
 /// One self-contained HTML file that shows error against time, per scene and over all scenes, with the Pareto front, the answers
@@ -29,16 +35,37 @@ pub fn sweep_page(sweep: &Sweep) -> String {
         }
     }
     let failed = sweep.rows.iter().filter(|row| row.failed.is_some()).count();
-    let mut body = format!("<h1>{}</h1>\n<p class=\"quiet\">{}</p>\n", escape(&sweep.title), escape(&sweep.device));
+    let mut body = format!("<h1>{}</h1>\n<p class=\"quiet\">{}</p>\n", escape(&sweep.title), escape(&sweep.devices.join(", ")));
     body.push_str(&answers(sweep, &parts, failed));
     for (scene, light) in &sweep.light {
         body.push_str(&light_box(light, &format!("Which light is compared: {scene}")));
     }
-    body.push_str("<h2>Error against time</h2>\n<p class=\"quiet\">Both axes are logarithmic; lower left is better. Ringed points are on the Pareto front: no other is both faster and more accurate.");
+    body.push_str("<h2>Error against time</h2>\n<p class=\"quiet\">Both axes are logarithmic; lower left is better. Bars are 95 % intervals. Ringed points are on the Pareto front: none that stands there is shown to be better in time or error without being worse in the other. A difference counts where its 99 % interval leaves out zero and it is at least 1 % of the error, or 2 % of the time. Numbers are those of the tables below.");
     if sweep.target_error.is_some() || sweep.target_ms.is_some() {
         body.push_str(" Dashed lines are the targets.");
     }
+    if parts.iter().any(|part| floor(part).is_some()) {
+        body.push_str(" The dotted line is the error that the noise of the reference alone would give a perfect picture: near it and below, points say little.");
+    }
     body.push_str("</p>\n");
+    if let Some(metric) = Metric::of(&sweep.metric) {
+        body.push_str(&format!(
+            "<p class=\"quiet\"><strong>{}</strong> ({}; {}): {} <cite>{}</cite></p>\n",
+            escape(metric.title),
+            Direction::of(metric.name).words(),
+            escape(metric.range),
+            escape(metric.meaning),
+            escape(metric.source)
+        ));
+    }
+    let unknown = parts
+        .iter()
+        .flat_map(|part| &part.points)
+        .filter(|point| point.ms_error.is_none() || point.error.standard_error().is_none())
+        .count();
+    if unknown > 0 {
+        body.push_str(&format!("<p class=\"quiet\">Of {unknown} points the noise of time or error is not known; they are taken as exact. More rounds, samples or seeds would tell it.</p>\n"));
+    }
     body.push_str(&legend(&variants));
     body.push_str("<div class=\"plots\">");
     for part in &parts {
@@ -47,6 +74,10 @@ pub fn sweep_page(sweep: &Sweep) -> String {
     body.push_str("</div>\n<h2>The Pareto front</h2>\n");
     for part in &parts {
         body.push_str(&format!("<h3>{}</h3>\n{}\n", escape(&part.name), front_table(part, sweep, &variants)));
+    }
+    body.push_str("<h2>The other configurations</h2>\n");
+    for part in &parts {
+        body.push_str(&format!("<h3>{}</h3>\n{}\n", escape(&part.name), rest_table(part, sweep, &variants)));
     }
     body.push_str(&failures(sweep));
     body.push_str(&all_rows(sweep));
@@ -70,8 +101,36 @@ fn parts(sweep: &Sweep) -> Vec<Part> {
 }
 
 fn part(name: &str, note: String, points: Vec<Configuration>) -> Part {
-    let bare: Vec<(f64, f64)> = points.iter().map(Configuration::point).collect();
-    Part { name: name.to_owned(), note, front: pareto_front(&bare), points }
+    let front = pareto_front(&points);
+    let labels = labels(&points, &front);
+    Part { name: name.to_owned(), note, points, front, labels }
+}
+
+/// Numbers, and the parameters in which points differ, under the last part of their names.
+fn labels(points: &[Configuration], front: &[usize]) -> Vec<Label> {
+    let varies = |name: &str| points.iter().any(|point| point.parameters.get(name) != points[0].parameters.get(name));
+    let mut others = front.len();
+    let label = |(index, point): (usize, &Configuration)| {
+        let number = front.iter().position(|&one| one == index).map_or_else(
+            || {
+                others += 1;
+                others
+            },
+            |place| place + 1,
+        );
+        let differing = point.parameters.iter().filter(|(name, _)| varies(name));
+        let words: Vec<String> =
+            differing.map(|(name, value)| format!("{} {}", name.rsplit('.').next().unwrap_or(name), parameter(value))).collect();
+        let words = words.join(", ");
+        // What does not fit is in the table.
+        Label { number, words: if words.chars().count() <= 28 { words } else { String::new() } }
+    };
+    points.iter().enumerate().map(label).collect()
+}
+
+/// The noise of the reference in a plot: that of its points, which have one reference.
+fn floor(part: &Part) -> Option<f64> {
+    part.points.iter().filter_map(|point| point.floor).filter(|floor| *floor > 0.0 && floor.is_finite()).reduce(f64::max)
 }
 
 /// What the targets ask for, in words; without targets, the ends of the front.
@@ -83,15 +142,18 @@ fn answers(sweep: &Sweep, parts: &[Part], failed: usize) -> String {
         (Some(target), _, _, _) => answer_error(first, sweep, target),
         (None, Some(target), _, _) => answer_ms(first, sweep, target),
         (None, None, Some(&accurate), Some(&fast)) if accurate == fast => {
-            format!("{} is the fastest and the most accurate", name(&first.points[fast]))
+            format!(
+                "{} stands alone: none is shown to be faster or more accurate without being worse in the other",
+                name(&first.points[fast])
+            )
         }
         (None, None, Some(&accurate), Some(&fast)) => format!(
             "From {} (fastest, {}) to {} (most accurate, {} {})",
             name(&first.points[fast]),
             with_unit(first.points[fast].ms, "ms"),
             name(&first.points[accurate]),
-            sweep.metric,
-            number(first.points[accurate].error)
+            plotted_title(&sweep.metric),
+            number(first.points[accurate].error.value)
         ),
         _ => "No configuration ended with a finite time and error".to_owned(),
     };
@@ -127,31 +189,55 @@ fn capital(sentence: &str) -> String {
 }
 
 fn name(point: &Configuration) -> String {
-    format!("{} ({})", point.variant, pairs_line(&point.parameters))
+    format!("{} ({})", point.variant, parameters_line(&point.parameters))
+}
+
+fn parameters_line(parameters: &BTreeMap<String, serde_json::Value>) -> String {
+    pairs_line(&parameters.iter().map(|(name, value)| (name.clone(), parameter(value))).collect::<Vec<_>>())
+}
+
+fn with_interval(text: String, found: Option<lobelia_measure::sampled::Interval>) -> String {
+    match found.and_then(|found| interval(Some(found.low), Some(found.high))) {
+        Some(interval) => format!("{text} ({interval})"),
+        None => text,
+    }
+}
+
+fn time(point: &Configuration) -> String {
+    with_interval(with_unit(point.ms, "ms"), point.ms_interval())
+}
+
+fn error(point: &Configuration) -> String {
+    with_interval(number(point.error.value), point.error_interval())
 }
 
 fn cost(point: &Configuration, sweep: &Sweep) -> String {
-    format!("{}, {} {}", with_unit(point.ms, "ms"), sweep.metric, number(point.error))
+    format!("{}, {} {}", time(point), plotted_title(&sweep.metric), error(point))
 }
 
-fn bare(part: &Part) -> Vec<(f64, f64)> {
-    part.points.iter().map(Configuration::point).collect()
+fn answer(part: &Part, sweep: &Sweep, choice: &Choice, what: &str, tie: &str, goal: &str) -> String {
+    match choice {
+        Choice::Found { index, ties } => {
+            let ties: Vec<String> = ties.iter().map(|&tie| name(&part.points[tie])).collect();
+            let ties = if ties.is_empty() { String::new() } else { format!("; no difference in {tie} is shown to {}", ties.join(", ")) };
+            format!("the {what} {goal}: {}, {}{ties}", name(&part.points[*index]), cost(&part.points[*index], sweep))
+        }
+        Choice::Perhaps(index) => {
+            let point = &part.points[*index];
+            format!("nothing is shown to reach {goal}; {} may, {}", name(point), cost(point, sweep))
+        }
+        Choice::Nothing => format!("nothing reaches {goal}"),
+    }
 }
 
 fn answer_error(part: &Part, sweep: &Sweep, target: f64) -> String {
-    let goal = format!("{} of at most {}", sweep.metric, number(target));
-    match cheapest_under_error(&bare(part), target) {
-        Some(index) => format!("the cheapest with {goal}: {}, {}", name(&part.points[index]), cost(&part.points[index], sweep)),
-        None => format!("nothing reaches {goal}"),
-    }
+    let goal = format!("{} of at most {}", plotted_title(&sweep.metric), number(target));
+    answer(part, sweep, &cheapest_under_error(&part.points, target), "cheapest with", "time", &goal)
 }
 
 fn answer_ms(part: &Part, sweep: &Sweep, target: f64) -> String {
     let goal = format!("at most {}", with_unit(target, "ms"));
-    match most_accurate_under_time(&bare(part), target) {
-        Some(index) => format!("the most accurate in {goal}: {}, {}", name(&part.points[index]), cost(&part.points[index], sweep)),
-        None => format!("nothing takes {goal}"),
-    }
+    answer(part, sweep, &most_accurate_under_time(&part.points, target), "most accurate in", "accuracy", &goal)
 }
 
 fn legend(variants: &[&str]) -> String {
@@ -172,15 +258,15 @@ fn mark(variant: usize) -> String {
 }
 
 fn figure(part: &Part, sweep: &Sweep, variants: &[&str]) -> String {
-    let targets = Targets { error: sweep.target_error, ms: sweep.target_ms };
+    let lines = Lines { error: sweep.target_error, ms: sweep.target_ms, floor: floor(part) };
     let plotted = if part.points.is_empty() {
         "<p class=\"failed\">No configuration ended.</p>".to_owned()
     } else {
-        match plot(&part.points, &part.front, variants, &sweep.metric, targets) {
+        match plot(&part.points, &part.front, &part.labels, variants, &plotted_title(&sweep.metric), lines) {
             Ok(svg) => {
                 let words = format!(
                     "{} against frame time for {}: {} configurations, {} on the Pareto front, which the table below lists",
-                    sweep.metric,
+                    plotted_title(&sweep.metric),
                     part.name,
                     part.points.len(),
                     part.front.len()
@@ -190,7 +276,7 @@ fn figure(part: &Part, sweep: &Sweep, variants: &[&str]) -> String {
             Err(error) => format!("<p class=\"failed\">{}</p>", escape(&error.to_string())),
         }
     };
-    let exact = part.points.iter().filter(|point| point.error <= 0.0 || point.ms <= 0.0).count();
+    let exact = part.points.iter().filter(|point| point.error.value <= 0.0 || point.ms <= 0.0).count();
     let floor =
         if exact > 0 { format!(" {exact} with an error or a time of zero lie on the edge: zero has no logarithm.") } else { String::new() };
     format!("<figure><figcaption>{} <small>{}.{floor}</small></figcaption>{plotted}</figure>", escape(&part.name), escape(&part.note))
@@ -200,26 +286,41 @@ fn front_table(part: &Part, sweep: &Sweep, variants: &[&str]) -> String {
     if part.front.is_empty() {
         return "<p>The front is empty: nothing ended with a finite time and error.</p>".to_owned();
     }
-    let rows: String = part
-        .front
+    table(part, sweep, variants, &part.front, "Pareto front")
+}
+
+fn rest_table(part: &Part, sweep: &Sweep, variants: &[&str]) -> String {
+    let rest: Vec<usize> = (0..part.points.len()).filter(|index| !part.front.contains(index)).collect();
+    if rest.is_empty() {
+        return "<p>There are none.</p>".to_owned();
+    }
+    let table = table(part, sweep, variants, &rest, "Other configurations");
+    format!("<details><summary>{} that one on the front beats</summary>{table}</details>", rest.len())
+}
+
+fn table(part: &Part, sweep: &Sweep, variants: &[&str], indices: &[usize], what: &str) -> String {
+    let rows: String = indices
         .iter()
         .map(|&index| {
             let point = &part.points[index];
             let variant = variants.iter().position(|name| *name == point.variant).unwrap_or(0);
+            let ms = interval(point.ms_interval().map(|found| found.low), point.ms_interval().map(|found| found.high)).unwrap_or_default();
+            let off = interval(point.error_interval().map(|found| found.low), point.error_interval().map(|found| found.high)).unwrap_or_default();
             format!(
-                "<tr><th scope=\"row\"><span class=\"chip v{}\">{}</span></th><td>{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td></tr>",
+                "<tr><td class=\"number\">{}</td><th scope=\"row\"><span class=\"chip v{}\">{}</span></th><td>{}</td><td class=\"number\">{}<small>{ms}</small></td><td class=\"number\">{}<small>{off}</small></td></tr>",
+                part.labels[index].number,
                 variant % 8,
                 escape(&point.variant),
-                escape(&pairs_line(&point.parameters)),
+                escape(&parameters_line(&point.parameters)),
                 with_unit(point.ms, "ms"),
-                number(point.error)
+                number(point.error.value)
             )
         })
         .collect();
     format!(
-        "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Pareto front: {}\"><table><thead><tr><th scope=\"col\">Variant</th><th scope=\"col\">Parameters</th><th scope=\"col\">Frame time<small>lower is better</small></th><th scope=\"col\">{}<small>lower is better</small></th></tr></thead><tbody>{rows}</tbody></table></div>",
+        "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{what}: {}\"><table><thead><tr><th scope=\"col\">No.</th><th scope=\"col\">Variant</th><th scope=\"col\">Parameters</th><th scope=\"col\">Frame time<small>lower is better</small></th><th scope=\"col\">{}<small>lower is better</small></th></tr></thead><tbody>{rows}</tbody></table></div>",
         escape(&part.name),
-        escape(&sweep.metric)
+        escape(&plotted_title(&sweep.metric))
     )
 }
 
@@ -229,7 +330,7 @@ fn failures(sweep: &Sweep) -> String {
         .iter()
         .filter_map(|row| {
             let message = row.failed.as_ref()?;
-            let parameters = escape(&pairs_line(&row.parameters));
+            let parameters = escape(&parameters_line(&row.parameters));
             Some(format!(
                 "<li>{}, {} ({parameters}), seed {}: <code>{}</code></li>",
                 escape(&row.scene),
@@ -249,13 +350,17 @@ fn all_rows(sweep: &Sweep) -> String {
         .map(|row| {
             let values = match row.failed {
                 Some(_) => "<td colspan=\"2\">failed</td>".to_owned(),
-                None => format!("<td class=\"number\">{}</td><td class=\"number\">{}</td>", with_unit(row.ms, "ms"), number(row.error)),
+                None => format!(
+                    "<td class=\"number\">{}</td><td class=\"number\">{}</td>",
+                    with_unit(row.ms, "ms"),
+                    row.error.as_ref().map_or_else(|| "not finite".to_owned(), |error| number(error.value))
+                ),
             };
             format!(
                 "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td>{values}</tr>",
                 escape(&row.scene),
                 escape(&row.variant),
-                escape(&pairs_line(&row.parameters)),
+                escape(&parameters_line(&row.parameters)),
                 row.seed
             )
         })
@@ -263,6 +368,6 @@ fn all_rows(sweep: &Sweep) -> String {
     format!(
         "<h2>All runs</h2>\n<details><summary>{} runs</summary><div class=\"scroll\"><table><thead><tr><th scope=\"col\">Scene</th><th scope=\"col\">Variant</th><th scope=\"col\">Parameters</th><th scope=\"col\">Seed</th><th scope=\"col\">Frame time</th><th scope=\"col\">{}</th></tr></thead><tbody>{rows}</tbody></table></div></details>\n",
         sweep.rows.len(),
-        escape(&sweep.metric)
+        escape(&plotted_title(&sweep.metric))
     )
 }

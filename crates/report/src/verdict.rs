@@ -1,51 +1,77 @@
-//! Which variant is better, and where: the line on top of the page.
+//! Which variant is shown to be better, and where: the lines on top of the page.
 
-use image::RgbImage;
+use crate::{
+    data::{Better, Comparison},
+    direction::Direction,
+    html::{number, value_with_interval, with_unit},
+    metric::{Metric, error_of},
+};
 
-use crate::data::{Comparison, Picture};
-use crate::direction::Direction;
-use crate::html::{number, with_unit};
+/// Metrics that decide, the first that is there; where none is, the first in the order of the page.
+const DECIDING: [&str; 4] = ["flip_hdr", "flip", "relative_mse", "rmse"];
 
-/// Relative gap of a metric or of a time below which two variants are called equal.
-const EQUAL: f64 = 0.01;
-
-/// Metrics that decide, the first that is there; where none is, the first by name.
-const DECIDING: [&str; 4] = ["flip", "relative mse", "relmse", "rmse"];
+/// The name under which the times of frames are compared.
+pub(crate) const FRAME: &str = "frame_ms";
 
 /// What the top of the page says.
 pub(crate) struct Verdict {
     pub headline: String,
     pub sentences: Vec<String>,
-    pub map: Option<WhereMap>,
 }
 
 pub(crate) fn verdict(comparison: &Comparison) -> Verdict {
-    let map = WhereMap::new(comparison);
     let (headline, mut sentences) = words(comparison);
-    if let Some(map) = &map {
-        sentences.extend(map.sentences(comparison));
+    if let Some(map) = comparison.map.as_ref().filter(|map| map.is_whole(comparison.variants.len())) {
+        sentences.extend(map.sentences(|index| quoted(&comparison.variants[index].name)));
     }
-    Verdict { headline, sentences, map }
+    Verdict { headline, sentences }
 }
 
 /// Name of the metric that decides.
 pub(crate) fn deciding_metric(comparison: &Comparison) -> Option<String> {
     let names = metric_names(comparison);
-    let preferred = DECIDING.iter().find_map(|wanted| names.iter().find(|name| name.to_lowercase().replace('_', " ").contains(wanted)));
+    let preferred = DECIDING.iter().find_map(|wanted| names.iter().find(|name| name.to_lowercase() == *wanted));
     preferred.or(names.first()).cloned()
 }
 
-/// Names of all metrics of all variants, sorted.
+/// Names of all metrics of all variants, in the order of the page.
 pub(crate) fn metric_names(comparison: &Comparison) -> Vec<String> {
     let mut names: Vec<String> = comparison.variants.iter().flat_map(|variant| variant.metrics.keys().cloned()).collect();
-    names.sort();
+    Metric::sort(&mut names);
     names.dedup();
     names
 }
 
-/// The value of one metric for each variant, NaN where a variant does not have it.
-pub(crate) fn metric_values(comparison: &Comparison, metric: &str) -> Vec<f64> {
-    comparison.variants.iter().map(|variant| variant.metrics.get(metric).copied().unwrap_or(f64::NAN)).collect()
+/// The error of each variant by a metric, or its time by [`FRAME`]; infinite where it has none.
+fn errors(comparison: &Comparison, metric: &str) -> Vec<f64> {
+    let of = |variant: &crate::data::Variant| {
+        if metric == FRAME {
+            return variant.frame_ms.map_or(f64::INFINITY, |time| time.median);
+        }
+        variant.metrics.get(metric).map_or(f64::INFINITY, |found| error_of(metric, found.value))
+    };
+    comparison.variants.iter().map(of).map(|error| if error.is_nan() { f64::INFINITY } else { error }).collect()
+}
+
+/// Whether variant `a` is shown to be better than variant `b`.
+pub(crate) fn is_better(comparison: &Comparison, metric: &str, a: usize, b: usize) -> bool {
+    let (a, b) = (&comparison.variants[a].name, &comparison.variants[b].name);
+    comparison
+        .comparisons
+        .iter()
+        .filter(|one| one.metric == metric)
+        .any(|one| (one.better == Better::A && one.a == *a && one.b == *b) || (one.better == Better::B && one.a == *b && one.b == *a))
+}
+
+/// The variant of the least error by a measure, and those that it is not shown to be better than, itself first. Empty where no variant has a finite value.
+pub(crate) fn leaders(comparison: &Comparison, metric: &str) -> Vec<usize> {
+    let errors = errors(comparison, metric);
+    let Some(best) = (0..errors.len()).filter(|&index| errors[index].is_finite()).min_by(|&a, &b| errors[a].total_cmp(&errors[b])) else {
+        // Likenesses of equal pictures are infinite.
+        return Vec::new();
+    };
+    let rest = (0..errors.len()).filter(|&other| other != best && errors[other].is_finite() && !is_better(comparison, metric, best, other));
+    std::iter::once(best).chain(rest).collect()
 }
 
 fn words(comparison: &Comparison) -> (String, Vec<String>) {
@@ -53,71 +79,109 @@ fn words(comparison: &Comparison) -> (String, Vec<String>) {
     let Some(metric) = deciding_metric(comparison) else {
         return ("No metric to compare by".to_owned(), Vec::new());
     };
-    let direction = Direction::of(&metric);
-    let values = metric_values(comparison, &metric);
-    let times: Vec<f64> = variants.iter().map(|variant| variant.total_ms).collect();
-    let accurate = order(&values, direction);
-    let fast = order(&times, Direction::Lower);
+    let title = Metric::title(&metric);
     let name = |index: usize| quoted(&variants[index].name);
-    let (Some(&best), second) = (accurate.first(), accurate.get(1).copied()) else {
-        return (format!("No variant has a finite {metric}"), Vec::new());
+    let accurate = leaders(comparison, &metric);
+    let Some(&best) = accurate.first() else {
+        return (format!("No variant has a finite {title}"), Vec::new());
     };
-    let Some(second) = second else {
-        let only = format!("{}: {metric} {}, {}", name(best), number(values[best]), with_unit(times[best], "ms"));
+    let value = |index: usize| variants[index].metrics.get(&metric).map_or_else(|| "no value".to_owned(), value_with_interval);
+    let finite = errors(comparison, &metric).iter().filter(|error| error.is_finite()).count();
+    if finite < 2 {
+        let time = variants[best].frame_ms.map_or_else(String::new, |time| format!(", {}", with_unit(time.median, "ms")));
+        let only = format!("{}: {title} {}{time}", name(best), value(best));
         return (only, vec!["There is no second variant with this metric to hold it against.".to_owned()]);
-    };
-    let equal = gap(direction.badness(values[best]), direction.badness(values[second])) < EQUAL;
-    // Without a time of the best there is nothing to say of who is faster than it.
-    let fastest = fast.first().copied().filter(|_| fast.len() > 1 && times[best].is_finite());
-    let as_fast = |index: usize| fastest.is_some_and(|fastest| gap(times[fastest], times[index]) < EQUAL);
-    let headline = match (equal, fastest) {
-        (false, Some(fastest)) if fastest == best => format!("{} is better: more accurate and faster", name(best)),
-        (false, Some(_)) if as_fast(best) => format!("{} is better: more accurate, and as fast", name(best)),
-        (false, Some(fastest)) => format!("{} is more accurate, {} is faster", name(best), name(fastest)),
-        (false, None) => format!("{} is more accurate", name(best)),
-        (true, Some(fastest)) => {
-            let close = accurate.iter().filter(|&&index| gap(direction.badness(values[best]), direction.badness(values[index])) < EQUAL);
-            let names: Vec<String> = close.map(|&index| name(index)).collect();
-            let all_as_fast = accurate.iter().all(|&index| as_fast(index));
-            let speed = if all_as_fast { "they are equally fast".to_owned() } else { format!("{} is the fastest", name(fastest)) };
-            format!("{} are equally accurate; {speed}", names.join(" and "))
+    }
+    let fast = leaders(comparison, FRAME);
+    let timed = errors(comparison, FRAME).iter().filter(|ms| ms.is_finite()).count() == variants.len()
+        && variants.iter().all(|variant| variant.frame_ms.is_some_and(|time| time.low.is_some()));
+    let headline = match (accurate.as_slice(), fast.as_slice()) {
+        ([_], _) if !timed => format!("{} is more accurate", name(best)),
+        ([_], [fastest]) if *fastest == best => format!("{} is better: more accurate and faster", name(best)),
+        ([_], [fastest]) => format!("{} is more accurate, {} is faster", name(best), name(*fastest)),
+        ([_], several) if several.contains(&best) => format!("{} is more accurate; no faster one is shown", name(best)),
+        ([_], several) => format!("{} is more accurate, {} are faster", name(best), list(several, &name)),
+        (tied, fast) => {
+            let accuracy = match tied {
+                [a, b] => format!("No difference in accuracy is shown between {} and {}", name(*a), name(*b)),
+                _ => format!("None is shown to be more accurate among {}", list(tied, &name)),
+            };
+            match fast {
+                _ if !timed => accuracy,
+                [fastest] => format!("{accuracy}; {} is faster", name(*fastest)),
+                _ if fast.len() == variants.len() => format!("{accuracy}, nor in time"),
+                several => format!("{accuracy}; {} are faster", list(several, &name)),
+            }
         }
-        (true, None) => format!("{} and {} are equally accurate", name(best), name(second)),
     };
-    let mut sentences = vec![format!(
-        "{metric} ({}): {} for {}, {} for {}{}.",
-        direction.words(),
-        number(values[best]),
-        name(best),
-        number(values[second]),
-        name(second),
-        share(direction, values[best], values[second])
-    )];
-    if let (Some(&first), Some(&last)) = (fast.first(), fast.last())
-        && first != last
+    let mut sentences = Vec::new();
+    let all: Vec<String> =
+        sorted(&errors(comparison, &metric)).into_iter().map(|index| format!("{} for {}", value(index), name(index))).collect();
+    sentences.push(format!("{title} ({}): {}.", Direction::of(&metric).words(), all.join(", ")));
+    if accurate.len() > 1 {
+        sentences.push("What differs there lies within the noise of samples and reference, or is too small to matter.".to_owned());
+    }
+    sentences.extend(times(comparison, &fast, timed));
+    for other in metric_names(comparison).iter().filter(|other| **other != metric) {
+        let rivals = if accurate.len() > 1 { accurate.clone() } else { vec![best] };
+        let winner = leaders(comparison, other).first().copied().filter(|winner| {
+            // Where accuracy is a tie, another metric may tell them apart; where it is not, only what speaks against the verdict is news.
+            rivals.iter().any(|&rival| rival != *winner && is_better(comparison, other, *winner, rival))
+                && (accurate.len() > 1 || *winner != best)
+        });
+        if let Some(winner) = winner {
+            let but = if accurate.len() > 1 { "By" } else { "But by" };
+            let shown = variants[winner].metrics.get(other).map_or_else(String::new, |found| format!(" ({})", value_with_interval(found)));
+            let against: Vec<usize> =
+                rivals.iter().copied().filter(|&rival| rival != winner && is_better(comparison, other, winner, rival)).collect();
+            sentences.push(format!("{but} {} {} is better than {}{shown}.", Metric::title(other), name(winner), list(&against, &name)));
+        }
+    }
+    if let (Some(floor), Some(found)) = (comparison.reference.floor.get(&metric), variants[best].metrics.get(&metric))
+        && error_of(&metric, found.value) < 2.0 * error_of(&metric, *floor)
+        && Direction::of(&metric) == Direction::Lower
     {
-        let (fast_ms, slow_ms) = (times[first], times[last]);
-        let factor = if fast_ms > 0.0 { format!(" ({} times as long)", number(slow_ms / fast_ms)) } else { String::new() };
         sentences.push(format!(
-            "A frame takes {} with {}, {} with {}{factor}.",
-            with_unit(fast_ms, "ms"),
-            name(first),
-            with_unit(slow_ms, "ms"),
-            name(last)
+            "The noise of the reference alone would make {title} {}: what is near that may be closer to the truth than it seems; a reference with less noise would tell.",
+            number(*floor)
         ));
     }
-    for other in metric_names(comparison).iter().filter(|other| **other != metric) {
-        let values = metric_values(comparison, other);
-        let order = order(&values, Direction::of(other));
-        if let (Some(&winner), Some(&next)) = (order.first(), order.get(1))
-            && winner != best
-            && !equal
-            && gap(Direction::of(other).badness(values[winner]), Direction::of(other).badness(values[next])) >= EQUAL
-        {
-            sentences.push(format!("But by {other} {} is better ({}).", name(winner), number(values[winner])));
-        }
-    }
     (headline, sentences)
+}
+
+/// What is said of times.
+fn times(comparison: &Comparison, fast: &[usize], timed: bool) -> Vec<String> {
+    let order = sorted(&errors(comparison, FRAME));
+    let (Some(&first), Some(&last)) = (order.first(), order.last()) else { return Vec::new() };
+    let name = |index: usize| quoted(&comparison.variants[index].name);
+    let time = |index: usize| comparison.variants[index].frame_ms.map_or_else(String::new, |time| crate::html::time_with_interval(&time));
+    if first == last {
+        return Vec::new();
+    }
+    let mut sentences = vec![format!("A frame takes {} with {}, {} with {}.", time(first), name(first), time(last), name(last))];
+    if !timed {
+        sentences.push("Times are of one round, so that nothing tells their noise: who is faster is not said.".to_owned());
+    } else if fast.len() > 1 {
+        sentences.push(format!("{} is not shown to be faster than {}.", name(fast[0]), list(&fast[1..], &name)));
+    }
+    sentences
+}
+
+/// Indices of finite errors, the least first.
+fn sorted(errors: &[f64]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..errors.len()).filter(|&index| errors[index].is_finite()).collect();
+    order.sort_by(|&a, &b| errors[a].total_cmp(&errors[b]));
+    order
+}
+
+/// Names with commas and an "and".
+fn list(indices: &[usize], name: &impl Fn(usize) -> String) -> String {
+    let names: Vec<String> = indices.iter().map(|&index| name(index)).collect();
+    match names.split_last() {
+        Some((last, rest)) if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
+        Some((last, _)) => last.clone(),
+        None => String::new(),
+    }
 }
 
 /// Names hold commas and verbs: quotes show where one ends.
@@ -125,146 +189,13 @@ fn quoted(name: &str) -> String {
     format!("“{name}”")
 }
 
-/// Indices of the finite values, the best first.
-fn order(values: &[f64], direction: Direction) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..values.len()).filter(|&index| values[index].is_finite()).collect();
-    order.sort_by(|&a, &b| direction.badness(values[a]).total_cmp(&direction.badness(values[b])));
-    order
-}
-
-/// Difference of two values over the larger of their sizes, 0 for two zeros.
-fn gap(a: f64, b: f64) -> f64 {
-    let size = a.abs().max(b.abs());
-    if size == 0.0 { 0.0 } else { (a - b).abs() / size }
-}
-
-fn share(direction: Direction, best: f64, second: f64) -> String {
-    match direction {
-        Direction::Lower if second > 0.0 && best >= 0.0 && best < second => format!(" ({} % lower)", number((1.0 - best / second) * 100.0)),
-        _ => String::new(),
-    }
-}
-
-/// Which variant is closest to the reference, tile by tile, on the pictures as shown (8 bits, tone-mapped).
-pub(crate) struct WhereMap {
-    pub columns: u32,
-    pub rows: u32,
-    /// Index of the closest variant, none where no variant leads.
-    pub closest: Vec<Option<usize>>,
-    /// Mean absolute difference from the reference, in levels of 255, per variant and tile.
-    distance: Vec<Vec<f64>>,
-}
-
-/// A lead must be visible: at least this much of the runner-up's distance, and this many levels of 255.
-const LEAD: f64 = 0.1;
-const LEAD_LEVELS: f64 = 0.25;
-
-impl WhereMap {
-    /// None with fewer than two variants, and where pictures cannot be decoded or their sizes differ.
-    fn new(comparison: &Comparison) -> Option<Self> {
-        let reference = decode(&comparison.reference)?;
-        let pictures: Vec<RgbImage> = comparison.variants.iter().map(|variant| decode(&variant.picture)).collect::<Option<_>>()?;
-        let (width, height) = reference.dimensions();
-        if pictures.len() < 2 || width == 0 || height == 0 || pictures.iter().any(|picture| picture.dimensions() != (width, height)) {
-            return None;
-        }
-        let columns = width.min(24);
-        let rows = (f64::from(columns) * f64::from(height) / f64::from(width)).round().clamp(1.0, f64::from(height.min(24))) as u32;
-        let tile_of = |x: u32, y: u32| {
-            let column = u64::from(x) * u64::from(columns) / u64::from(width);
-            let row = u64::from(y) * u64::from(rows) / u64::from(height);
-            (row * u64::from(columns) + column) as usize
-        };
-        let tiles = (columns * rows) as usize;
-        let distance: Vec<Vec<f64>> = pictures
-            .iter()
-            .map(|picture| {
-                let (mut sums, mut counts) = (vec![0.0; tiles], vec![0.0; tiles]);
-                for ((x, y, expected), pixel) in reference.enumerate_pixels().zip(picture.pixels()) {
-                    let tile = tile_of(x, y);
-                    let difference: u32 = expected.0.iter().zip(pixel.0).map(|(a, b)| u32::from(a.abs_diff(b))).sum();
-                    sums[tile] += f64::from(difference) / 3.0;
-                    counts[tile] += 1.0;
-                }
-                sums.iter().zip(&counts).map(|(sum, count)| sum / f64::max(*count, 1.0)).collect()
-            })
-            .collect();
-        let closest = (0..tiles)
-            .map(|tile| {
-                let mut order: Vec<usize> = (0..distance.len()).collect();
-                order.sort_by(|&a, &b| distance[a][tile].total_cmp(&distance[b][tile]));
-                let lead = distance[order[1]][tile] - distance[order[0]][tile];
-                (lead >= LEAD_LEVELS && lead >= LEAD * distance[order[1]][tile]).then_some(order[0])
-            })
-            .collect();
-        Some(Self { columns, rows, closest, distance })
-    }
-
-    /// Share of the tiles in which a variant leads.
-    pub fn share(&self, variant: usize) -> f64 {
-        self.closest.iter().filter(|winner| **winner == Some(variant)).count() as f64 / self.closest.len() as f64
-    }
-
-    fn sentences(&self, comparison: &Comparison) -> Vec<String> {
-        let mut leads: Vec<usize> = (0..self.distance.len()).filter(|&variant| self.share(variant) > 0.0).collect();
-        leads.sort_by(|&a, &b| self.share(b).total_cmp(&self.share(a)));
-        if leads.is_empty() {
-            return vec!["Nowhere in the picture does one of them come visibly closer to the reference.".to_owned()];
-        }
-        let parts: Vec<String> = leads
-            .iter()
-            .map(|&variant| {
-                let advantage = |tile: usize| {
-                    let runner_up = (0..self.distance.len()).filter(|&other| other != variant).map(|other| self.distance[other][tile]);
-                    let lead = runner_up.fold(f64::INFINITY, f64::min) - self.distance[variant][tile];
-                    if self.closest[tile] == Some(variant) { lead } else { 0.0 }
-                };
-                let share = self.share(variant) * 100.0;
-                format!(
-                    "{} in {share:.0} % of the picture, most at the {}",
-                    quoted(&comparison.variants[variant].name),
-                    self.region(advantage)
-                )
-            })
-            .collect();
-        let mut sentences = vec![format!("Visibly closer to the reference: {}.", parts.join("; "))];
-        let best = leads[0];
-        if self.distance[best].iter().any(|&distance| distance >= 1.0) {
-            let region = self.region(|tile| self.distance[best][tile]);
-            sentences.push(format!("What is left of the error of {} is largest at the {region}.", quoted(&comparison.variants[best].name)));
-        }
-        sentences
-    }
-
-    /// The ninth of the picture where the mean weight is largest.
-    fn region(&self, weight: impl Fn(usize) -> f64) -> &'static str {
-        const NAMES: [&str; 9] = ["upper left", "top", "upper right", "left", "centre", "right", "lower left", "bottom", "lower right"];
-        let (mut sums, mut counts) = ([0.0f64; 9], [0.0f64; 9]);
-        for tile in 0..self.closest.len() {
-            let (column, row) = (tile as u32 % self.columns, tile as u32 / self.columns);
-            let ninth = (row * 3 / self.rows * 3 + column * 3 / self.columns) as usize;
-            sums[ninth] += weight(tile);
-            counts[ninth] += 1.0;
-        }
-        let mean = |ninth: usize| sums[ninth] / counts[ninth].max(1.0);
-        let largest = (0..9).max_by(|&a, &b| mean(a).total_cmp(&mean(b))).unwrap_or(4);
-        NAMES[largest]
-    }
-}
-
 /// What is wrong with a picture, in words; none where it can be shown.
-pub(crate) fn fault(picture: &Picture) -> Option<String> {
-    match decode(picture) {
-        None => Some("is not a whole PNG file".to_owned()),
-        Some(decoded) if decoded.dimensions() != (picture.width, picture.height) => {
-            let (width, height) = decoded.dimensions();
-            Some(format!("is {width} x {height} pixels, not {} x {}", picture.width, picture.height))
+pub(crate) fn fault(picture: &crate::data::Picture) -> Option<String> {
+    match image::load_from_memory_with_format(&picture.png, image::ImageFormat::Png) {
+        Err(_) => Some("is not a whole PNG file".to_owned()),
+        Ok(decoded) if (decoded.width(), decoded.height()) != (picture.width, picture.height) => {
+            Some(format!("is {} x {} pixels, not {} x {}", decoded.width(), decoded.height(), picture.width, picture.height))
         }
-        Some(_) => None,
+        Ok(_) => None,
     }
-}
-
-fn decode(picture: &Picture) -> Option<RgbImage> {
-    let decoded = image::load_from_memory_with_format(&picture.png, image::ImageFormat::Png).ok()?;
-    Some(decoded.to_rgb8())
 }

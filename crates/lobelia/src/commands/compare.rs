@@ -1,29 +1,23 @@
 use super::{
-    SceneArguments, parse_size,
+    SceneArguments, compare_report, parse_size,
     reference::{Paths, growth_bar, parse_error, show_growth},
     sequence,
     sequence::{Expected, FlickerAgainst, OWN_SAMPLES, SequenceArguments},
 };
 use crate::{failure::Failure, files};
-use comfy_table::{CellAlignment, Table, presets};
 use indicatif::{ProgressBar, ProgressStyle};
 use lobelia::{
     Session, Shot,
     frame::LightTransport,
-    graph::{Override, Timing},
+    graph::Override,
     light::{self, Claim, Lights},
-    measure::{self, Image, read_exr, timing::Ratio},
-    reference::LightPaths,
-    reference::Settings,
-    report::{Comparison, Light, PassCost, PassDifference, Picture, Variant, comparison_page},
-    trial::{self, Measured, Technique, TrialOptions},
+    measure::{self, Image, read_exr},
+    reference::{LightPaths, Settings},
+    report::{self, Light},
+    trial::{self, Technique, TrialOptions},
     truth::{self, Goal},
 };
-use std::{
-    collections::BTreeMap,
-    io::Write,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 /// Render several techniques, measure each against the truth, and write a page about it.
 ///
@@ -47,22 +41,22 @@ pub struct Arguments {
     #[arg(value_name = "GRAPH", required = true)]
     techniques: Vec<String>,
     #[command(flatten)]
-    scene: SceneArguments,
+    pub(super) scene: SceneArguments,
     /// Override a parameter in every graph that has it: PASS.PARAM=VALUE.
     #[arg(long = "set", value_name = "PASS.PARAM=VALUE")]
     overrides: Vec<Override>,
     #[command(flatten)]
     truth: TruthArguments,
     #[command(flatten)]
-    shot: ShotArguments,
+    pub(super) shot: ShotArguments,
     #[command(flatten)]
-    sequence: SequenceArguments,
+    pub(super) sequence: SequenceArguments,
     /// Folder for the report; made if it does not exist.
     #[arg(long, value_name = "DIR")]
-    report: PathBuf,
+    pub(super) report: PathBuf,
     /// Print nothing but errors.
     #[arg(short, long)]
-    quiet: bool,
+    pub(super) quiet: bool,
 }
 
 /// What is the truth.
@@ -130,14 +124,15 @@ pub struct ShotArguments {
     /// Size of the pictures in pixels, each side at most 8192.
     #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "480x270")]
     pub size: [u32; 2],
-    /// Average this many sub-pixel-jittered frames in linear radiance; edges need 16 to be compared with a reference.
+    /// Average this many sub-pixel-jittered frames in linear radiance; edges need 16 to be compared with a reference. Intervals of metrics are over groups of
+    /// them; with fewer than 4, over six pictures with other seeds.
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub samples: u32,
     /// Seed of everything random in the techniques.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u32,
-    /// Render every technique this many times, in turn, for its times; the first round warms up.
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    /// Render every technique this many times, in turn, for its times and their intervals; the first round warms up.
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub rounds: u32,
     /// Use the device whose name contains this.
     #[arg(long, value_name = "NAME")]
@@ -164,7 +159,8 @@ pub struct Known {
     pub image: Image,
     /// Of each value; empty where it is not known.
     pub variance: Vec<[f32; 3]>,
-    pub note: String,
+    /// Where it comes from, for the report; its picture and the floor are filled in there.
+    pub about: report::Reference,
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -210,7 +206,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         expected = Expected::Own(own.into_iter().map(|one| one.frames).collect());
     }
     bar.finish_and_clear();
-    write(arguments, &scene, &known, &expected, &shot, &measured, light)
+    compare_report::write(arguments, &scene, &known, &expected, &shot, &measured, light)
 }
 
 /// Techniques of the same name would be one row; later ones get a number.
@@ -250,7 +246,9 @@ pub fn reference(
                 format!("{}: it has {} x {} pixels, but --size is {} x {}", file.display(), size[0], size[1], shot.size[0], shot.size[1]);
             return Err(Failure::Input(what));
         }
-        return Ok(Known { image, variance: Vec::new(), note: format!("{}", file.display()) });
+        let variance = variance_beside(file, &image)?;
+        let about = report::Reference { file: Some(file.display().to_string()), ..Default::default() };
+        return Ok(Known { image, variance, about });
     }
     let camera = scene.camera(shot.camera.as_deref()).map_err(lobelia::SessionError::from)?;
     let goal = truth.goal();
@@ -259,9 +257,35 @@ pub fn reference(
     let settings = Settings { size: shot.size, paths: *paths, samples: goal.samples, seed: REFERENCE_SEED };
     let found = truth::truth(scene, &camera, settings, goal.error, cache.as_deref(), &mut |growth| show_growth(&bar, growth))?;
     bar.finish_and_clear();
-    let note =
-        format!("path-traced ({paths}), {} samples per pixel, relative MSE of its own noise {:.1e}", found.samples, found.relative_noise);
-    Ok(Known { image: found.image, variance: found.variance, note })
+    let (paths, depth) = match paths {
+        LightPaths::Full { depth } => ("full", Some(*depth)),
+        LightPaths::OneBounce => ("one-bounce", None),
+        LightPaths::Direct => ("direct", None),
+        // Which it is stands in `light` of the report.
+        LightPaths::Only(_) => ("only", None),
+    };
+    let about = report::Reference {
+        paths: Some(paths.to_owned()),
+        depth,
+        samples_per_pixel: Some(found.samples),
+        relative_noise: Some(found.relative_noise),
+        ..Default::default()
+    };
+    Ok(Known { image: found.image, variance: found.variance, about })
+}
+
+/// The variance that `lobelia reference` and this command write beside a picture `R.exr`, as `R.variance.exr`; empty where it is not there.
+fn variance_beside(file: &Path, image: &Image) -> Result<Vec<[f32; 3]>, Failure> {
+    let beside = file.with_extension("variance.exr");
+    if !beside.is_file() {
+        return Ok(Vec::new());
+    }
+    let variance = read_exr(&beside).map_err(|error| Failure::Input(error.to_string()))?;
+    if (variance.width, variance.height) != (image.width, image.height) {
+        let what = format!("{}: it has another size than {}", beside.display(), file.display());
+        return Err(Failure::Input(what));
+    }
+    Ok(variance.pixels)
 }
 
 /// Which light is compared, and the shares of what is not. `paths` is that of the truth, `None` where it is a file. Shares are means over small pictures of few samples:
@@ -319,207 +343,8 @@ pub fn show_trial(bar: &ProgressBar, step: &trial::TrialStep<'_>, shot: &Shot) -
     true
 }
 
-/// Metrics by name, for tables and files.
-pub fn metrics(image: &Image, reference: &Image) -> Result<BTreeMap<String, f64>, Failure> {
-    let found = measure::measure(reference, image).map_err(measured_wrong)?;
-    let value = serde_json::to_value(found).map_err(|error| Failure::Run(error.to_string()))?;
-    let numbers = value.as_object().into_iter().flatten().map(|(name, value)| {
-        // JSON has no infinity: the PSNR of equal pictures.
-        (name.clone(), value.as_f64().unwrap_or(f64::INFINITY))
-    });
-    Ok(numbers.collect())
-}
-
-fn measured_wrong(error: measure::MeasureError) -> Failure {
-    Failure::Run(error.to_string())
-}
-
-/// A picture as every picture of a report is displayed: at one exposure, chosen from the reference.
-fn displayed(reference: &Image, image: &Image) -> Result<Picture, Failure> {
-    let bytes: Vec<u8> = measure::display(reference, image)
-        .pixels
-        .as_flattened()
-        .iter()
-        .map(|value| (value.clamp(0.0, 1.0) * 255.0).round() as u8)
-        .collect();
-    encode(image.width, image.height, &bytes)
-}
-
-fn encode(width: usize, height: usize, rgb: &[u8]) -> Result<Picture, Failure> {
-    let mut png = Vec::new();
-    let encoder = image::codecs::png::PngEncoder::new(&mut png);
-    image::ImageEncoder::write_image(encoder, rgb, width as u32, height as u32, image::ExtendedColorType::Rgb8)
-        .map_err(|error| Failure::Run(format!("a picture cannot be encoded: {error}")))?;
-    Ok(Picture { width: width as u32, height: height as u32, png })
-}
-
-/// A map in colours, from `low` (black) to `high`.
-fn map_picture(image: &Image, map: &[f32], low: f32, high: f32) -> Result<Picture, Failure> {
-    encode(image.width, image.height, measure::false_colour(map, low, high).as_flattened())
-}
-
-const MEBIBYTE: f64 = (1u64 << 20) as f64;
-
-fn write(
-    arguments: &Arguments,
-    scene: &lobelia::scene::Scene,
-    known: &Known,
-    expected: &Expected,
-    shot: &Shot,
-    measured: &[Measured],
-    light: Light,
-) -> Result<(), Failure> {
-    let folder = &arguments.report;
-    files::write_exr(&folder.join("reference.exr"), &known.image)?;
-    let mut variants = Vec::new();
-    for (index, one) in measured.iter().enumerate() {
-        files::write_exr(&folder.join(format!("{}.exr", file_name(&one.name))), &one.image)?;
-        let mut variant = variant(one, &measured[0], known)?;
-        if let Some(flicker) = sequence::temporal_error(expected, index, one)? {
-            variant.metrics.insert("temporal_error".to_owned(), flicker);
-        }
-        variants.push(variant);
-    }
-    let differences = measured[1..].iter().flat_map(|other| {
-        trial::differences(&measured[0], other).into_iter().map(|difference| PassDifference {
-            pass: difference.pass,
-            a: measured[0].name.clone(),
-            b: other.name.clone(),
-            change: difference.change,
-            what: difference.what,
-        })
-    });
-    let comparison = Comparison {
-        title: format!("{} on {}", measured.iter().map(|one| one.name.as_str()).collect::<Vec<_>>().join(", "), arguments.scene.scene),
-        device: measured[0].device.clone(),
-        scene: facts(arguments, scene, known, measured)
-            .into_iter()
-            .chain(sequence::fact(expected, arguments.scene.time, shot).map(|fact| ("sequence".to_owned(), fact)))
-            .collect(),
-        command: std::iter::once("lobelia".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" "),
-        reference: displayed(&known.image, &known.image)?,
-        light: Some(light),
-        differences: differences.collect(),
-        variants,
-    };
-    let page = comparison_page(&comparison);
-    write_text(&folder.join("report.html"), &page)?;
-    let json = serde_json::to_string_pretty(&comparison).map_err(|error| Failure::Run(error.to_string()))?;
-    write_text(&folder.join("report.json"), &json)?;
-    if !arguments.quiet {
-        print_table(&comparison, measured, known)?;
-        writeln!(std::io::stdout(), "wrote {}", folder.join("report.html").display())?;
-    }
-    Ok(())
-}
-
 /// Writes text so that it is whole or absent.
 pub fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
+    use std::io::Write as _;
     files::atomically(path, |file| file.write_all(text.as_bytes()).map_err(|error| error.to_string()))
-}
-
-/// A name without what file systems dislike.
-fn file_name(name: &str) -> String {
-    name.chars().map(|letter| if letter.is_ascii_alphanumeric() || "-_+.@=,".contains(letter) { letter } else { '_' }).collect()
-}
-
-fn variant(one: &Measured, first: &Measured, known: &Known) -> Result<Variant, Failure> {
-    let mut settings = vec![("compared".to_owned(), one.output.clone())];
-    settings.extend(
-        one.passes.iter().filter(|pass| pass.params != "()").map(|pass| (format!("{} ({})", pass.name, pass.kind), pass.params.clone())),
-    );
-    settings.push(("pipelines compiled in".to_owned(), format!("{:.2} s", one.compile_seconds)));
-    if one.name != first.name
-        && let Some(ratio) = Ratio::paired(&one.round_ms, &first.round_ms)
-    {
-        settings.push((format!("time over {}", first.name), ratio_text(&ratio)));
-    }
-    let passes = one.passes.iter().map(|pass| {
-        let gpu = pass.gpu_ms;
-        PassCost {
-            name: pass.name.clone(),
-            median_ms: gpu.map_or(f64::NAN, |summary| summary.median),
-            p5_ms: gpu.map_or(f64::NAN, |summary| summary.p5),
-            p95_ms: gpu.map_or(f64::NAN, |summary| summary.p95),
-            mebibytes: pass.bytes as f64 / MEBIBYTE,
-            cpu_ms: pass.cpu_ms.map_or(f64::NAN, |summary| summary.median),
-        }
-    });
-    let relative = measure::relative_error_map(&known.image, &one.image).map_err(measured_wrong)?;
-    let flip = measure::flip_hdr(&known.image, &one.image, measure::flip::PIXELS_PER_DEGREE).map_err(measured_wrong)?;
-    Ok(Variant {
-        name: one.name.clone(),
-        settings,
-        metrics: metrics(&one.image, &known.image)?,
-        picture: displayed(&known.image, &one.image)?,
-        error: map_picture(&one.image, &relative, 1e-3, 1.0)?,
-        flip: Some(map_picture(&one.image, &flip.map, 0.0, 1.0)?),
-        passes: passes.collect(),
-        pruned: one.dropped.clone(),
-        total_ms: one.frame_ms.map_or(f64::NAN, |summary| summary.median),
-        total_mebibytes: one.bytes as f64 / MEBIBYTE,
-    })
-}
-
-fn ratio_text(ratio: &Ratio) -> String {
-    if ratio.count < 2 {
-        return format!("{:.2} (one round: no interval)", ratio.ratio);
-    }
-    format!("{:.2} (95 % between {:.2} and {:.2}, {} rounds)", ratio.ratio, ratio.interval.0, ratio.interval.1, ratio.count)
-}
-
-fn facts(arguments: &Arguments, scene: &lobelia::scene::Scene, known: &Known, measured: &[Measured]) -> Vec<(String, String)> {
-    let traits = scene.traits();
-    let size = arguments.shot.size;
-    let how = match measured[0].timing {
-        Timing::Off => "not taken",
-        Timing::Timestamps => "timestamps on the device",
-        Timing::Isolated => "wall clock, each pass alone",
-    };
-    [
-        ("scene", arguments.scene.scene.clone()),
-        ("camera", arguments.shot.camera.clone().unwrap_or_else(|| "the first".to_owned())),
-        ("size", format!("{} x {} pixels, {} sub-pixel samples", size[0], size[1], arguments.shot.samples)),
-        ("triangles", traits.triangles.to_string()),
-        ("lights", format!("{} without extent, {} with extent", traits.punctual_lights(), traits.area_lights())),
-        ("distribution of normals", scene.ndf.to_string()),
-        ("reference", known.note.clone()),
-        ("maps", "relative error from 0.1 % (black) to 100 % (yellow), logarithmic; FLIP (HDR) from 0 to 1".to_owned()),
-        ("times", format!("{how}; {} rounds in turn, the first not counted", arguments.shot.rounds)),
-    ]
-    .map(|(name, value)| (name.to_owned(), value))
-    .to_vec()
-}
-
-fn print_table(comparison: &Comparison, measured: &[Measured], known: &Known) -> Result<(), Failure> {
-    let mut table = Table::new();
-    // What a terminal has room for; the page has all of them.
-    let names = ["relative_mse", "flip_hdr", "ssim", "fireflies", "temporal_error"];
-    let names: Vec<&str> = names.into_iter().filter(|name| comparison.variants.iter().any(|one| one.metrics.contains_key(*name))).collect();
-    let mut header = vec!["technique".to_owned(), "device ms".to_owned(), "over the first".to_owned(), "MiB".to_owned()];
-    header.extend(names.iter().map(|name| (*name).to_owned()));
-    let columns = header.len();
-    table.load_style(presets::NOTHING).set_header(header);
-    for column in 1..columns {
-        if let Some(column) = table.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-    for (variant, one) in comparison.variants.iter().zip(measured) {
-        let ratio =
-            Ratio::paired(&one.round_ms, &measured[0].round_ms).map_or_else(|| "-".to_owned(), |ratio| format!("{:.2}", ratio.ratio));
-        let mut row = vec![variant.name.clone(), format!("{:.2}", variant.total_ms), ratio, format!("{:.2}", variant.total_mebibytes)];
-        row.extend(names.iter().map(|name| variant.metrics.get(*name).map_or_else(String::new, |value| format!("{value:.3e}"))));
-        table.add_row(row);
-    }
-    let mut out = std::io::stdout().lock();
-    writeln!(out, "{table}")?;
-    writeln!(out, "device: {}; reference: {}", comparison.device, known.note)?;
-    for sentence in comparison.light.iter().flat_map(Light::sentences) {
-        writeln!(out, "light: {sentence}")?;
-    }
-    if let Some((_, sequence)) = comparison.scene.iter().find(|(name, _)| name == "sequence") {
-        writeln!(out, "sequence: {sequence}")?;
-    }
-    Ok(())
 }

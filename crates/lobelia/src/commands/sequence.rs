@@ -4,8 +4,12 @@ use super::compare::{Known, ShotArguments, TruthArguments, reference};
 use crate::failure::Failure;
 use lobelia::{
     Shot, frame_time,
-    measure::{self, Image},
+    measure::{
+        self, Image,
+        sampled::{Replication, Sampled},
+    },
     reference::LightPaths,
+    report::SequenceSettings,
     scene::Scene,
     trial::Measured,
 };
@@ -133,30 +137,32 @@ fn noise_flicker(known: &[Known]) -> f64 {
     if change == 0.0 { 0.0 } else { (change / values as f64) / (total / pixels as f64) }
 }
 
-/// Flicker of one technique; `None` where there is one frame.
-pub fn temporal_error(expected: &Expected, index: usize, measured: &Measured) -> Result<Option<f64>, Failure> {
+/// Flicker of one technique, with a value for each step; `None` where there is one frame.
+pub fn temporal_error(expected: &Expected, index: usize, measured: &Measured) -> Result<Option<Sampled>, Failure> {
     let frames = match expected {
         Expected::Nothing => return Ok(None),
         Expected::Truth(frames, _) => frames,
         Expected::Own(frames) => &frames[index],
     };
-    let found = measure::temporal_error(frames, &measured.frames).map_err(|error| Failure::Run(error.to_string()))?;
-    Ok(Some(found.0))
+    let (steps, _) = measure::temporal_errors(frames, &measured.frames).map_err(|error| Failure::Run(error.to_string()))?;
+    let value = steps.iter().sum::<f64>() / steps.len() as f64;
+    Ok(Some(Sampled { value, replicates: steps, replication: Replication::Steps }))
 }
 
-/// What was done, in words; `None` where there is one frame.
-pub fn fact(expected: &Expected, start: f32, shot: &Shot) -> Option<String> {
-    let against = match expected {
+/// What was done; `None` where there is one frame.
+pub fn settings(expected: &Expected, shot: &Shot) -> Option<SequenceSettings> {
+    let (against, own_samples, reference_flicker) = match expected {
         Expected::Nothing => return None,
-        Expected::Truth(_, noise) => format!("path-traced frames, whose noise alone would make {noise:.1e} if each had its own"),
-        Expected::Own(_) => {
-            format!("each technique's own mean over {} samples: its bias is not seen", shot.samples.saturating_mul(OWN_SAMPLES))
-        }
+        Expected::Truth(_, noise) => ("truth", None, Some(*noise)),
+        Expected::Own(_) => ("own", Some(shot.samples.saturating_mul(OWN_SAMPLES)), None),
     };
-    let seeds = if shot.new_seeds { ", random numbers of its own for each" } else { "" };
-    Some(format!(
-        "{} frames, {} per second, from {start} s{seeds}; flicker (temporal_error) against {against}; pictures and other metrics are of the last frame",
-        shot.frames,
-        1.0 / shot.frame_seconds
-    ))
+    Some(SequenceSettings {
+        frames: shot.frames,
+        // What was asked for is a single float.
+        frames_per_second: f64::from((1.0 / shot.frame_seconds * 1e4).round() / 1e4),
+        new_seeds: shot.new_seeds,
+        flicker_against: against.to_owned(),
+        own_samples,
+        reference_flicker,
+    })
 }

@@ -1,4 +1,7 @@
-use super::compare::{Known, ShotArguments, TruthArguments, compared_light, make_folder, metrics, reference, trial_bar, write_text};
+use super::{
+    compare::{Known, ShotArguments, TruthArguments, compared_light, make_folder, reference, trial_bar, write_text},
+    compare_report::{floor, metrics},
+};
 use crate::failure::Failure;
 use comfy_table::{CellAlignment, Table, presets};
 use indicatif::ProgressBar;
@@ -6,13 +9,15 @@ use lobelia::{
     Session, SessionOptions,
     graph::GraphFile,
     light::{self, Claim},
+    measure::sampled::Interval,
     reference::LightPaths,
-    report::{self, Light, SweepRow, cheapest_under_error, most_accurate_under_time, sweep_page},
+    report::{self, Choice, Configuration, Light, SweepRow, cheapest_under_error, most_accurate_under_time, plotted_error, sweep_page},
     scene::Scene,
     sweep::{Cell, Row, Shard, Store, Sweep, SweepError, merge},
     trial::{self, Technique},
 };
 use std::{
+    collections::BTreeMap,
     io::Write,
     path::{Path, PathBuf},
 };
@@ -132,6 +137,7 @@ struct References(Option<SceneTruth>);
 struct SceneTruth {
     scene: String,
     known: Known,
+    floor: BTreeMap<String, f64>,
     paths: LightPaths,
     lights: Vec<(String, Claim, Light)>,
 }
@@ -156,7 +162,7 @@ impl References {
                 let truth = TruthArguments::for_sweep(sweep);
                 let paths = light::truth_paths(truth.asked(), &claims);
                 let known = reference(scene, &truth, &paths, shot, true)?;
-                SceneTruth { scene: address.to_owned(), known, paths, lights: Vec::new() }
+                SceneTruth { scene: address.to_owned(), floor: floor(&known)?, known, paths, lights: Vec::new() }
             }
         };
         Ok(self.0.insert(truth))
@@ -233,16 +239,48 @@ fn fill(arguments: &Arguments, sweep: &Sweep, cell: &Cell, references: &mut Refe
     let measured = trial::run(&scene, &[technique], &shot, &shot_arguments.trial(), &mut |_| true)?;
     let [one] = measured.as_slice() else { return Ok(()) };
     row.device = one.device.clone();
-    row.ms = one.frame_ms.map(|summary| summary.median);
+    row.ms = one.frame_ms.as_ref().map(|time| time.summary.median);
+    row.round_ms = one.frame_ms.iter().flat_map(|time| time.logarithm.replicates.iter().map(|logarithm| logarithm.exp())).collect();
     row.mebibytes = Some(one.bytes as f64 / (1u64 << 20) as f64);
-    row.passes = one.passes.iter().map(|pass| (pass.name.clone(), pass.gpu_ms.map(|summary| summary.median))).collect();
-    row.metrics = metrics(&one.image, &truth.known.image)?;
+    row.passes = one.passes.iter().map(|pass| (pass.name.clone(), pass.gpu_ms.as_ref().map(|time| time.summary.median))).collect();
+    row.floor = truth.floor.clone();
+    row.replication = Some(one.pictures.replication.clone());
+    for (name, found) in metrics(&truth.known, &measured)?.into_iter().flatten() {
+        row.metrics.insert(name.clone(), found.value);
+        if !found.replicates.is_empty() && found.replicates.iter().all(|value| value.is_finite()) {
+            row.replicates.insert(name, found.replicates);
+        }
+    }
     Ok(())
 }
 
 /// Variants for people.
 fn variant_name(variant: &str) -> &str {
     if variant.is_empty() { "the graph as it is" } else { variant }
+}
+
+/// A parameter as the sweep file has it: a number or a bool where it is one.
+fn typed(text: &str) -> serde_json::Value {
+    serde_json::from_str(text)
+        .ok()
+        .filter(|value: &serde_json::Value| value.is_number() || value.is_boolean())
+        .unwrap_or_else(|| text.into())
+}
+
+/// A row as the page has it, its error that of the metric.
+fn shown(row: &Row, metric: &str) -> SweepRow {
+    let plotted = |value: f64| plotted_error(metric, value);
+    SweepRow {
+        scene: row.scene.clone(),
+        variant: variant_name(&row.variant).to_owned(),
+        parameters: row.parameters.iter().map(|(name, value)| (name.clone(), typed(value))).collect(),
+        seed: row.seed.into(),
+        ms: row.ms.unwrap_or(f64::NAN),
+        round_ms: row.round_ms.clone(),
+        error: row.sampled(metric).map(|found| found.map(plotted)),
+        floor: row.floor.get(metric).copied().map(plotted).filter(|floor| floor.is_finite()),
+        failed: row.failed.clone(),
+    }
 }
 
 /// The page, and what it answers.
@@ -253,15 +291,6 @@ fn conclude(arguments: &Arguments, rows: &[Row]) -> Result<(), Failure> {
         let names: Vec<&str> = known.metrics.keys().map(String::as_str).collect();
         return Err(Failure::Input(format!("--metric {}: the rows have {}", arguments.metric, names.join(", "))));
     }
-    let shown = |row: &Row| SweepRow {
-        scene: row.scene.clone(),
-        variant: variant_name(&row.variant).to_owned(),
-        parameters: row.parameters.clone(),
-        seed: row.seed.into(),
-        ms: row.ms.unwrap_or(f64::NAN),
-        error: row.metrics.get(&arguments.metric).copied().unwrap_or(f64::NAN),
-        failed: row.failed.clone(),
-    };
     let devices: std::collections::BTreeSet<&str> = rows.iter().map(|row| row.device.as_str()).filter(|name| !name.is_empty()).collect();
     let mut light: Vec<(String, Light)> = Vec::new();
     for row in rows {
@@ -273,9 +302,10 @@ fn conclude(arguments: &Arguments, rows: &[Row]) -> Result<(), Failure> {
         }
     }
     let sweep = report::Sweep {
+        version: report::VERSION,
         title: format!("{} runs", rows.len()),
-        device: devices.into_iter().collect::<Vec<_>>().join(", "),
-        rows: rows.iter().map(shown).collect(),
+        devices: devices.into_iter().map(str::to_owned).collect(),
+        rows: rows.iter().map(|row| shown(row, &arguments.metric)).collect(),
         light,
         metric: arguments.metric.clone(),
         target_error: arguments.target_error,
@@ -290,7 +320,6 @@ fn conclude(arguments: &Arguments, rows: &[Row]) -> Result<(), Failure> {
         return Ok(());
     }
     let overall = report::overall(&sweep.rows);
-    let points: Vec<(f64, f64)> = overall.iter().map(report::Configuration::point).collect();
     let mut out = std::io::stdout().lock();
     let mut table = Table::new();
     table.load_style(presets::NOTHING).set_header(["setting on the front", "ms", arguments.metric.as_str()]);
@@ -301,22 +330,33 @@ fn conclude(arguments: &Arguments, rows: &[Row]) -> Result<(), Failure> {
     }
     let name = |index: usize| {
         let one = &overall[index];
-        let parameters = one.parameters.iter().map(|(name, value)| format!(" {name}={value}"));
+        let parameters = one
+            .parameters
+            .iter()
+            .map(|(name, value)| format!(" {name}={}", value.as_str().map_or_else(|| value.to_string(), str::to_owned)));
         std::iter::once(one.variant.clone()).chain(parameters).collect::<String>()
     };
-    for index in report::pareto_front(&points) {
-        table.add_row([name(index), format!("{:.2}", points[index].0), format!("{:.3e}", points[index].1)]);
+    for index in report::pareto_front(&overall) {
+        table.add_row([name(index), ms(&overall[index]), error(&overall[index])]);
     }
     writeln!(out, "{table}")?;
-    if let Some(error) = arguments.target_error {
-        let found = cheapest_under_error(&points, error);
-        let text = found.map_or_else(|| "none".to_owned(), |index| format!("{}, {:.2} ms", name(index), points[index].0));
-        writeln!(out, "cheapest with {} at most {error}: {text}", arguments.metric)?;
+    if overall.iter().any(|one| one.ms_interval().is_some() || one.error_interval().is_some()) {
+        writeln!(out, "± is half of the 95 % interval")?;
     }
-    if let Some(ms) = arguments.target_ms {
-        let found = most_accurate_under_time(&points, ms);
-        let text = found.map_or_else(|| "none".to_owned(), |index| format!("{}, {:.3e}", name(index), points[index].1));
-        writeln!(out, "most accurate within {ms} ms: {text}")?;
+    let answer = |choice: Choice| match choice {
+        Choice::Found { index, ties } => {
+            let ties: Vec<String> = ties.into_iter().map(name).collect();
+            let ties = if ties.is_empty() { String::new() } else { format!("; no difference is shown to {}", ties.join(", ")) };
+            format!("{}, {} ms, {}{ties}", name(index), ms(&overall[index]), error(&overall[index]))
+        }
+        Choice::Perhaps(index) => format!("none is shown to; {} may", name(index)),
+        Choice::Nothing => "none".to_owned(),
+    };
+    if let Some(target) = arguments.target_error {
+        writeln!(out, "cheapest with {} at most {target}: {}", arguments.metric, answer(cheapest_under_error(&overall, target)))?;
+    }
+    if let Some(target) = arguments.target_ms {
+        writeln!(out, "most accurate within {target} ms: {}", answer(most_accurate_under_time(&overall, target)))?;
     }
     for (scene, light) in &sweep.light {
         for sentence in light.sentences() {
@@ -329,4 +369,17 @@ fn conclude(arguments: &Arguments, rows: &[Row]) -> Result<(), Failure> {
     }
     writeln!(out, "wrote {}", arguments.report.join("report.html").display())?;
     Ok(())
+}
+
+/// Half the width of an interval, in words.
+fn reach(interval: Option<Interval>, show: impl Fn(f64) -> String) -> String {
+    interval.map_or_else(String::new, |interval| format!(" ±{}", show(0.5 * (interval.high - interval.low))))
+}
+
+fn ms(one: &Configuration) -> String {
+    format!("{:.2}{}", one.ms, reach(one.ms_interval(), |half| format!("{half:.2}")))
+}
+
+fn error(one: &Configuration) -> String {
+    format!("{:.3e}{}", one.error.value, reach(one.error_interval(), |half| format!("{half:.0e}")))
 }
