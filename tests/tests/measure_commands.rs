@@ -135,7 +135,8 @@ fn a_comparison_says_what_the_pictures_say() {
     let typed: Comparison = serde_json::from_value(report.clone()).unwrap();
     assert_eq!(serde_json::to_value(&typed).unwrap(), report);
     assert_eq!((typed.version, typed.settings.size, typed.settings.samples, typed.settings.rounds), (1, [48, 48], 4, 2));
-    assert_eq!((typed.reference.paths.as_deref(), typed.reference.depth, typed.reference.file.as_deref()), (Some("full"), Some(2), None));
+    assert_eq!((typed.reference.paths.as_deref(), typed.reference.depth, typed.reference.file.as_deref()), (Some("only"), None, None));
+    assert!(typed.light.is_some_and(|light| light.held.is_some_and(|held| !held.is_empty())));
     assert_eq!(typed.replication, Replicated::Groups { count: 4 });
     let floor = typed.reference.floor["relative_mse"];
     assert!(floor > 0.0 && (0.5..2.0).contains(&(floor / typed.reference.relative_noise.unwrap())), "{:?}", typed.reference);

@@ -211,7 +211,9 @@ fn print_table(comparison: &Comparison, measured: &[Measured]) -> Result<(), Fai
     )?;
     for names in [&names[..], &["frame_ms"]].concat() {
         for one in comparison.comparisons.iter().filter(|one| one.metric == names && one.better == Better::Tie) {
-            writeln!(out, "{}: no difference is shown between {} and {}", one.metric, one.a, one.b)?;
+            // Without a known noise nothing was compared.
+            let what = if one.low.is_some() { "no difference is shown" } else { "the noise is not known, so no difference is claimed" };
+            writeln!(out, "{}: {what} between {} and {}", one.metric, one.a, one.b)?;
         }
     }
     writeln!(out, "device: {}; reference: {}", comparison.device.name, reference_note(&comparison.reference))?;
