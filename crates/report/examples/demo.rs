@@ -29,7 +29,7 @@ fn sweep() -> Sweep {
                         seed,
                         ms: if failed { f64::NAN } else { ms },
                         round_ms: [0.98, 1.01, 1.02, 0.99].map(|factor| factor * ms).to_vec(),
-                        error: (!failed).then(|| Sampled {
+                        error: (!failed).then_some(Sampled {
                             value: error,
                             replicates: [0.93, 1.05, 1.04, 0.97, 1.03].map(|factor| factor * error).to_vec(),
                             replication: Replication::Repeats,

@@ -146,7 +146,7 @@ fn row(scene: &str, variant: &str, samples: u32, ms: f64, error: f64, failed: Op
         seed: 3,
         ms,
         round_ms: if ms.is_finite() { [0.99, 1.0, 1.01, 1.0].map(|factor| short(factor * ms)).to_vec() } else { Vec::new() },
-        error: error.is_finite().then(|| Sampled { value: error, replicates, replication: Replication::Repeats }),
+        error: error.is_finite().then_some(Sampled { value: error, replicates, replication: Replication::Repeats }),
         floor: Some(0.0004),
         failed: failed.map(str::to_owned),
     }
