@@ -151,7 +151,7 @@ fn a_comparison_says_what_the_pictures_say() {
         assert!(said.low.unwrap() < said.value && said.value < said.high.unwrap());
         assert!(variant.frame_ms.unwrap().median > 0.0 && variant.bytes > 0);
         let pass = variant.passes.iter().find(|pass| pass.name == "lights").unwrap();
-        assert!(pass.gpu_ms.unwrap().median > 0.0 && pass.parameters["count"] == 64 && pass.kind == "vpl_lights", "{pass:?}");
+        assert!(pass.gpu_ms.unwrap().median > 0.0 && pass.parameters["count"] == 64 && pass.kind == "vpl-lights", "{pass:?}");
         assert_eq!(variant.tone.as_ref().map(|tone| (tone.curve.as_str(), tone.exposure)), Some(("agx", 2.0)));
     }
     // Light through walls is worse than light with shadows.
