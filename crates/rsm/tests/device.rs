@@ -290,8 +290,9 @@ fn a_tile_holds_what_a_layer_would() {
         assert!((x, y) == (0, 0) || (x, y) == (32, 0) || (x, y) == (0, 32) || (x, y) == (32, 32), "{x} {y}");
         let depths = many.depth[layer].to_f32_rgba();
         let expected = alone.depth[face].to_f32_rgba();
-        let differing = (0..32 * 32).filter(|index| depths[(y + index / 32) * 64 + x + index % 32][0] != expected[*index][0]).count();
-        assert_eq!(differing, 0, "face {face}");
+        // Rasterisers interpolate from the corner of the layer.
+        let differs = |index: &usize| (depths[(y + index / 32) * 64 + x + index % 32][0] / expected[*index][0] - 1.0).abs() > 1e-5;
+        assert_eq!((0..32 * 32).filter(differs).count(), 0, "face {face}");
     }
 }
 

@@ -132,6 +132,7 @@ fn thin_walls_keep_the_light_out() {
     if !has_gpu() {
         return;
     }
+    let mut failed = Vec::new();
     for size in [0.4, 4.0] {
         for wall in [1e-3, 3e-3, 1e-2] {
             let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z) * (size / 4.0);
@@ -146,11 +147,14 @@ fn thin_walls_keep_the_light_out() {
                     let scene = scene(vec![room(size, wall)], vec![lamp.clone()], camera.clone());
                     let found = direct(&scene, &[&format!("rsm.resolution={resolution}")]);
                     let lit = values(&found).filter(|value| *value > 0.0).count();
-                    assert_eq!(lit, 0, "{size} m, walls of {wall} m, {resolution} texels, {:?}: {lit} pixels are lit", lamp.kind);
+                    if lit > 0 {
+                        failed.push(format!("{size} m, walls of {wall} m, {resolution} texels, {:?}: {lit} pixels are lit", lamp.kind));
+                    }
                 }
             }
         }
     }
+    assert!(failed.is_empty(), "{}", failed.join("\n"));
 }
 
 fn many_lights(count: usize) -> Scene {
