@@ -321,7 +321,10 @@ fn nested_faces_hold_every_flux_once() {
     let _turn = turn();
     let mut ground = room();
     // A slab as wide as a town.
-    ground.positions.iter_mut().for_each(|position| *position = Vec3::new(position.x * 2000.0, position.y * 0.1 - 4.0, position.z * 2000.0));
+    ground
+        .positions
+        .iter_mut()
+        .for_each(|position| *position = Vec3::new(position.x * 2000.0, position.y * 0.1 - 4.0, position.z * 2000.0));
     let mut of = scene(vec![room(), ground], vec![sun()]);
     let at = |room: DVec3| world_from_room().transform_point3(room);
     let camera = Camera::look_at("near", at(DVec3::new(0.0, 3.0, 9.0)), at(DVec3::ZERO), DVec3::Y, 0.7, 0.01);
