@@ -153,7 +153,7 @@ fn shadow(first: RsmFace, position: vec3f, geometric_normal: vec3f) -> f32 {
     slack += settings.bias * footprint * min(sqrt(max(1.0 - cosine * cosine, 0.0)) / max(cosine, 1e-3), MAX_SLOPE);
 #endif
     // Rasterisers place corners to 1/256 of a texel.
-    let rounding = max(depth_scale * 1.52587890625e-5, face.rounding) + footprint / 32.0;
+    let rounding = max(depth_scale * 1.9073486328125e-6, face.rounding) + footprint / 256.0;
     let receiver = Receiver(position, geometric_normal, projected.xy, projected.z, slack, rounding, MAX_SLOPE * footprint);
     let width = i32(settings.filter_width);
     let corner = projected.xy * resolution - vec2f(0.5 * f32(width));
@@ -185,16 +185,23 @@ fn shadow(first: RsmFace, position: vec3f, geometric_normal: vec3f) -> f32 {
         if !own {
             return 0.0;
         }
-        // Where the receiver's surface meets the caster's in a concave edge, what lies in front of the caster is not what lies behind it.
-        for (var y = 0; y <= width; y++) {
+        var found = 0;
+        for (var y = -1; y <= width + 1; y++) {
             let weight_y = select(select(1.0, 1.0 - fraction.y, y == 0), fraction.y, y == width);
-            for (var x = 0; x <= width; x++) {
+            for (var x = -1; x <= width + 1; x++) {
                 let weight = weight_y * select(select(1.0, 1.0 - fraction.x, x == 0), fraction.x, x == width);
                 let tap = look(face, texel_at(face, base + vec2i(x, y)), receiver);
-                if tap.own && dot(tap.position - caster.position, caster.normal) > 0.0 {
+                found += select(0, 1, tap.own);
+                // Where the receiver's surface meets the caster's in a concave edge, what lies in front of the caster is not what lies behind it.
+                let inside = min(x, y) >= 0 && max(x, y) <= width;
+                if inside && tap.own && dot(tap.position - caster.position, caster.normal) > 0.0 {
                     lit -= weight;
                 }
             }
+        }
+        // A single texel was seen through a crack that rasterisation leaves where walls abut without sharing corners.
+        if found < 2 {
+            return 0.0;
         }
     } else if !caster.shades && !own {
         // In a corner the texels around may all be of what ends there: a look at those around them.

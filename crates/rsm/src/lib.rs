@@ -8,7 +8,10 @@
 //! flux is already projected), or `irradiance * texel area` for directional lights. `lobelia::reflective_shadow_map` is the accessor for all of this.
 //!
 //! A spot light is seen by one square face of its outer cone; point lights and spots wider than 65 degrees take the six faces of a cube, exactly
-//! 90 degrees each so that they meet without a seam; a directional light takes one orthographic face fitted around the scene.
+//! 90 degrees each so that they meet without a seam. Near planes lie before the nearest triangle. A directional light takes one orthographic face fitted around
+//! the scene, and, where cameras see less than a sixteenth of it, further ones that lie in each other around what the camera sees: a point's flux belongs to
+//! the finest face that holds it. Faces have a layer each, or share layers where they are more than 256; where they would take too much memory they have
+//! fewer texels than asked for, and the pass warns.
 
 mod faces;
 mod flux_density;

@@ -9,7 +9,7 @@ use lobelia_graph::{
     testing::{evaluate, gpu},
 };
 use lobelia_lobes::{light::spot_falloff, octahedral::octahedral_decode};
-use lobelia_scene::{LightKind, Material, Mesh, PunctualLight, Scene, device::GpuScene};
+use lobelia_scene::{Camera, LightKind, Material, Mesh, PunctualLight, Scene, device::GpuScene};
 use lobelia_shaders::Flags;
 use std::{
     f64::consts::{PI, TAU},
@@ -247,11 +247,103 @@ fn faces_are_counted_in_the_plan() {
     assert_eq!(faces(vec![spot(10.0, 64.9)]), 1);
     assert_eq!(faces(vec![spot(10.0, 65.1)]), 6);
     assert_eq!(faces(vec![point(), spot(5.0, 20.0), sun()]), 8);
-    let error = plan(&scene(vec![room()], vec![point(); 43]), 16).err().unwrap();
-    assert!(error.contains("258 faces") && error.contains("use fewer of them"), "{error}");
+    let error = plan(&scene(vec![room()], vec![point(); 16385]), 16).err().unwrap();
+    assert!(error.contains("98310 faces") && error.contains("use fewer of them"), "{error}");
     let error = plan(&scene(vec![room()], vec![]), 16).err().unwrap();
     assert!(error.contains("the scene has no point, spot or directional light"), "{error}");
     assert!(plan(&scene(vec![room()], vec![sun()]), 15).err().unwrap().contains("resolution"));
+}
+
+/// More faces than a texture has layers share layers, and are smaller where they would take too much memory, with a word; fewer keep what was asked for.
+#[test]
+fn many_faces_share_layers_and_memory() {
+    let planned = |lights: usize, resolution: u32| {
+        let plan = plan(&scene(vec![room()], vec![point(); lights]), resolution).unwrap();
+        let bytes = plan.resources[0].parts[0].bytes();
+        (bytes / 4, plan.warnings().collect::<Vec<_>>().join(" "))
+    };
+    assert_eq!(planned(10, 1024), (60 << 20, String::new()));
+    assert_eq!(planned(42, 128), (252 << 14, String::new()));
+    // Four faces a layer: 258 faces in 65 layers.
+    assert_eq!(planned(43, 64), (65 * 4 << 12, String::new()));
+    for (lights, side) in [(11, 512), (64, 256), (200, 128), (2000, 32)] {
+        let (texels, warnings) = planned(lights, 1024);
+        assert!(texels <= 25 << 20, "{lights} lights: {texels} texels");
+        assert!(texels >= lights as u64 * 6 * side * side, "{lights} lights: {texels} texels");
+        assert!(warnings.contains(&format!("{} faces; each has {side} texels", 6 * lights)), "{warnings}");
+    }
+}
+
+/// A lamp among fifty, whose faces lie in tiles, sees what it sees alone.
+#[test]
+fn a_tile_holds_what_a_layer_would() {
+    let Some(gpu) = gpu() else { return };
+    let _turn = turn();
+    let mut lights = vec![point(); 50];
+    lights[37] = light(LightKind::Point, DVec3::new(0.9, -0.4, 0.2), DVec3::Z, Vec3::ONE);
+    let many = draw(gpu, scene(vec![room()], lights.clone()), 32);
+    let alone = draw(gpu, scene(vec![room()], vec![lights[37].clone()]), 32);
+    for face in 0..6 {
+        let words = &many.faces[37 * 6 + face];
+        let (layer, x, y) = (words[34] as usize, words[40] as usize, words[41] as usize);
+        assert_eq!(words[33], 32, "texels a side");
+        assert!((x, y) == (0, 0) || (x, y) == (32, 0) || (x, y) == (0, 32) || (x, y) == (32, 32), "{x} {y}");
+        let depths = many.depth[layer].to_f32_rgba();
+        let expected = alone.depth[face].to_f32_rgba();
+        // Rasterisers interpolate from the corner of the layer.
+        let differs = |index: &usize| (depths[(y + index / 32) * 64 + x + index % 32][0] / expected[*index][0] - 1.0).abs() > 1e-5;
+        assert_eq!((0..32 * 32).filter(differs).count(), 0, "face {face}");
+    }
+}
+
+/// Near planes keep before what is near, whatever lies far away.
+#[test]
+fn a_far_away_thing_does_not_cut_off_what_is_near() {
+    let Some(gpu) = gpu() else { return };
+    let _turn = turn();
+    for far in [1.0f32, 1e2, 1e4] {
+        let mut away = room();
+        away.positions.iter_mut().for_each(|position| *position *= 2.0 * far);
+        for lamp in [point(), spot(10.0, 40.0)] {
+            let map = draw(gpu, scene(vec![room(), away.clone()], vec![lamp]), 32);
+            for texel in map.texels(gpu) {
+                let beyond = (map.in_room(texel.position).abs() - HALF).max_element();
+                assert!(texel.depth > 0.0 && beyond.abs() < 1e-5 * f64::from(far).max(1.0), "{far}: {texel:?} is {beyond} off the walls");
+            }
+        }
+    }
+}
+
+/// The faces of a sun over a large ground, with a camera that sees little of it: what all of them hold together is what a single one would.
+#[test]
+fn nested_faces_hold_every_flux_once() {
+    let Some(gpu) = gpu() else { return };
+    let _turn = turn();
+    let mut ground = room();
+    // A slab as wide as a town.
+    ground
+        .positions
+        .iter_mut()
+        .for_each(|position| *position = Vec3::new(position.x * 2000.0, position.y * 0.1 - 4.0, position.z * 2000.0));
+    let mut of = scene(vec![room(), ground], vec![sun()]);
+    let at = |room: DVec3| world_from_room().transform_point3(room);
+    let camera = Camera::look_at("near", at(DVec3::new(0.0, 3.0, 9.0)), at(DVec3::ZERO), DVec3::Y, 0.7, 0.01);
+    let single = draw(gpu, of.clone(), 256);
+    of.cameras.extend(camera);
+    let nested = draw(gpu, of, 256);
+    assert!(single.faces.len() == 1 && nested.faces.len() > 3, "{} faces", nested.faces.len());
+    close(nested.total_flux(gpu), single.total_flux(gpu), 1e-3);
+    // The finest sees the room in texels of a few centimetres; the widest does not see it at all.
+    let texels = nested.texels(gpu);
+    let on_room = |face: usize| {
+        let on_it = |texel: &&Texel| {
+            let local = nested.in_room(texel.position);
+            texel.face == face && texel.depth > 0.0 && texel.flux != DVec3::ZERO && (local.abs() - HALF).max_element().abs() < 1e-2
+        };
+        texels.iter().filter(on_it).count()
+    };
+    assert!(on_room(0) > 1000, "{} texels", on_room(0));
+    assert!((1..nested.faces.len()).all(|face| on_room(face) == 0));
 }
 
 /// The sum of flux over texels is the flux of the cone, for one face and for six.
