@@ -115,7 +115,7 @@ fn middle(image: &Image) -> f64 {
     f64::from(image.pixels[image.pixels.len() / 2][1])
 }
 
-const DIRECT: &str = r#""rsm": rsm(resolution: 64), "direct": direct(), "sum": compose(), "tonemap": tonemap(curve: none)"#;
+const DIRECT: &str = r#""rsm": rsm(resolution: 64), "direct": direct(), "sum": compose(), "tonemap": tonemap(curve: none, from: {"radiance": "sum.radiance"})"#;
 
 #[test]
 fn a_floor_under_any_sun_has_the_radiance_that_it_must() {
@@ -342,6 +342,62 @@ fn every_shipped_graph_is_planned_for_pictures_of_33_megapixels() {
                     );
                 }
             }
+        }
+    }
+}
+
+/// A metal floor below a quad light of one metre, seen from a height above it.
+fn grazed(folder: &Path, roughness: f64, height: f64, distance: f64) -> Scene {
+    let quads = [([-8.0, 0.0, 4.0], [16.0, 0.0, 0.0], [0.0, 0.0, -16.0])];
+    let material =
+        format!(r#"{{"pbrMetallicRoughness":{{"baseColorFactor":[0.9,0.9,0.9,1],"metallicFactor":1,"roughnessFactor":{roughness}}}}}"#);
+    let half = 0.5_f64.sqrt();
+    let light = format!(
+        r#"{{"translation":[0,2,0],"rotation":[{},0,0,{half}],"extras":{{"area_light":{{"shape":"quad","width":1.5,"height":1,"radiance":[5,4,3]}}}}}}"#,
+        -half
+    );
+    let turn = -(height / distance).atan() / 2.0;
+    let nodes = format!(r#"{{"camera":0,"translation":[0.2,{height},{distance}],"rotation":[{},0,0,{}]}},{light}"#, turn.sin(), turn.cos());
+    let camera = r#","cameras":[{"type":"perspective","perspective":{"yfov":0.7,"znear":0.01}}]"#;
+    Scene::load(&gltf(folder, "grazed.gltf", &quads, &material, &nodes, camera)).unwrap()
+}
+
+#[test]
+fn approximations_of_lobes_neither_glow_nor_go_out_at_grazing_views() {
+    if !has_gpu() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let graph = shipped("area-lights.ron");
+    for (roughness, height, distance) in
+        [(0.1, 0.02, 3.0), (0.1, 0.3, 3.5), (0.25, 0.02, 2.0), (0.25, 1.0, 3.0), (0.4, 0.1, 3.0), (0.7, 0.02, 3.0)]
+    {
+        let scene = grazed(folder.path(), roughness, height, distance);
+        let with = |variant: &str| {
+            let variants = vec!["no-visibility".to_owned(), variant.to_owned()];
+            render(&scene, &graph, &variants, &[], "area.radiance", &shot([24, 14])).0
+        };
+        let exact = with("exact-boundary");
+        let sum = |image: &Image| image.pixels.iter().map(|pixel| f64::from(pixel[1])).sum::<f64>();
+        for (variant, least, most, most_of_pixel) in [
+            ("lorentzian", 0.5, 2.0, 4.0),
+            ("lorentzian-pearson", 0.5, 2.0, 4.0),
+            ("ellipsoid", 0.5, 2.0, 4.0),
+            ("owen", 0.5, 2.0, 4.0),
+            ("ltc", 0.3, 1.5, 4.0),
+            ("mrp", 0.02, 2.0, 8.0),
+        ] {
+            let image = with(variant);
+            let mean = sum(&image) / sum(&exact);
+            // Pixels that are darker than a hundredth of the mean tell little.
+            let floor = 0.01 * sum(&exact) / exact.pixels.len() as f64;
+            let ratios = image.pixels.iter().zip(&exact.pixels).map(|(found, exact)| f64::from(found[1]) / f64::from(exact[1]).max(floor));
+            let worst = ratios.fold(0.0, f64::max);
+            eprintln!("roughness {roughness}, height {height}: {variant} mean {mean:.3}, brightest pixel {worst:.2}");
+            assert!(
+                mean > least && mean < most && worst < most_of_pixel,
+                "roughness {roughness}, height {height}: {variant} {mean} {worst}"
+            );
         }
     }
 }
