@@ -348,7 +348,7 @@ fn every_shipped_graph_is_planned_for_pictures_of_33_megapixels() {
                     // One bit for each light and pixel is more than is given for a thousand lights; how many there may be is said.
                     let text = format!("{problems:?}");
                     assert!(
-                        !text.contains("MiB") || text.contains("lights seen from") && text.contains("use at most"),
+                        !text.contains("MiB") || text.contains("lights seen from") && text.contains("use fewer lights (at most"),
                         "{}: {text}",
                         path.display()
                     );

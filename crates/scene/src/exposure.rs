@@ -33,7 +33,13 @@ impl Scene {
         let brightest = self.brightest_emission();
         let usual = self.usual_radiance(seen);
         // Without light on any surface, emission is all that there is to see, and it need not lie low.
-        let usual = if usual > 0.0 { usual } else if brightest <= MOST { brightest.min(*ORDINARY.end()) } else { brightest };
+        let usual = if usual > 0.0 {
+            usual
+        } else if brightest <= MOST {
+            brightest.min(*ORDINARY.end())
+        } else {
+            brightest
+        };
         factor(usual, brightest)
     }
 
