@@ -89,9 +89,20 @@ fn session(scene: &Scene) -> Session {
 
 /// A radiance of a graph, and its display image, if it ends in one.
 fn render(scene: &Scene, graph: &GraphFile, variants: &[String], set: &[&str], output: &str, shot: &Shot) -> (Image, Option<Vec<u8>>) {
+    render_in(&mut session(scene), graph, variants, set, output, shot)
+}
+
+/// The same on a device that has the scene, and what it has built before.
+fn render_in(
+    session: &mut Session,
+    graph: &GraphFile,
+    variants: &[String],
+    set: &[&str],
+    output: &str,
+    shot: &Shot,
+) -> (Image, Option<Vec<u8>>) {
     let overrides: Vec<_> = set.iter().map(|text| text.parse().unwrap()).collect();
     let wired = graph.wire(&lobelia::registry(), variants, &overrides).unwrap_or_else(|error| panic!("{error}"));
-    let mut session = session(scene);
     let mut shot = shot.clone();
     shot.keep.push(output.into());
     let mut rendering = session.start(&wired, &shot).unwrap();
@@ -115,7 +126,7 @@ fn middle(image: &Image) -> f64 {
     f64::from(image.pixels[image.pixels.len() / 2][1])
 }
 
-const DIRECT: &str = r#""rsm": rsm(resolution: 64), "direct": direct(), "sum": compose(), "tonemap": tonemap(curve: none)"#;
+const DIRECT: &str = r#""rsm": rsm(resolution: 64), "direct": direct(), "sum": compose(), "tonemap": tonemap(curve: none, from: {"radiance": "sum.radiance"})"#;
 
 #[test]
 fn a_floor_under_any_sun_has_the_radiance_that_it_must() {
@@ -302,16 +313,17 @@ fn a_scene_of_any_size_gives_the_same_picture() {
         let graph = shipped(name);
         let mut variants: Vec<Vec<String>> = vec![Vec::new()];
         variants.extend(graph.variant_names().map(|variant| vec![variant.to_owned()]));
+        let [mut metres, mut small, mut large] = [1.0, 1e-3, 1e3].map(|size| session(&corner(folder.path(), size, area)));
         for variant in &variants {
             // Two variants lack a pass that is made smaller here.
             let without = if variant == &["two-vsgl"] || variant == &["unshadowed"] { 1 } else { 0 };
             let set = &set[without..];
-            let at = |size: f64| render(&corner(folder.path(), size, area), &graph, variant, set, output, &shot([24, 14])).0;
-            let metres = at(1.0);
-            assert!(metres.pixels.iter().flatten().sum::<f32>() > 1.0, "{name} {variant:?}");
-            for size in [1e-3, 1e3] {
-                let (mean, apart) = difference(&at(size), &metres);
-                assert!(mean < 0.01 && apart < 0.02, "{name} {variant:?} at {size} times the size: mean {mean}, pixels {apart}");
+            let in_session = |session: &mut Session| render_in(session, &graph, variant, set, output, &shot([24, 14])).0;
+            let truth = in_session(&mut metres);
+            assert!(truth.pixels.iter().flatten().sum::<f32>() > 1.0, "{name} {variant:?}");
+            for (session, size) in [(&mut small, "a thousandth of"), (&mut large, "a thousand times")] {
+                let (mean, apart) = difference(&in_session(session), &truth);
+                assert!(mean < 0.01 && apart < 0.02, "{name} {variant:?} at {size} the size: mean {mean}, pixels {apart}");
             }
         }
     }
@@ -336,12 +348,71 @@ fn every_shipped_graph_is_planned_for_pictures_of_33_megapixels() {
                     // One bit for each light and pixel is more than is given for a thousand lights; how many there may be is said.
                     let text = format!("{problems:?}");
                     assert!(
-                        !text.contains("MiB") || text.contains("lights seen from") && text.contains("use at most"),
+                        !text.contains("MiB") || text.contains("lights seen from") && text.contains("use fewer lights (at most"),
                         "{}: {text}",
                         path.display()
                     );
                 }
             }
+        }
+    }
+}
+
+/// A metal floor below a quad light of one metre, seen from a height above it.
+fn grazed(folder: &Path, roughness: f64, height: f64, distance: f64) -> Scene {
+    let quads = [([-8.0, 0.0, 4.0], [16.0, 0.0, 0.0], [0.0, 0.0, -16.0])];
+    let material =
+        format!(r#"{{"pbrMetallicRoughness":{{"baseColorFactor":[0.9,0.9,0.9,1],"metallicFactor":1,"roughnessFactor":{roughness}}}}}"#);
+    let half = 0.5_f64.sqrt();
+    let light = format!(
+        r#"{{"translation":[0,2,0],"rotation":[{},0,0,{half}],"extras":{{"area_light":{{"shape":"quad","width":1.5,"height":1,"radiance":[5,4,3]}}}}}}"#,
+        -half
+    );
+    let turn = -(height / distance).atan() / 2.0;
+    let nodes = format!(r#"{{"camera":0,"translation":[0.2,{height},{distance}],"rotation":[{},0,0,{}]}},{light}"#, turn.sin(), turn.cos());
+    let camera = r#","cameras":[{"type":"perspective","perspective":{"yfov":0.7,"znear":0.01}}]"#;
+    Scene::load(&gltf(folder, "grazed.gltf", &quads, &material, &nodes, camera)).unwrap()
+}
+
+#[test]
+fn approximations_of_lobes_neither_glow_nor_go_out_at_grazing_views() {
+    if !has_gpu() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let graph = shipped("area-lights.ron");
+    for (roughness, height, distance) in
+        [(0.1, 0.02, 3.0), (0.1, 0.3, 3.5), (0.25, 0.02, 2.0), (0.25, 1.0, 3.0), (0.4, 0.1, 3.0), (0.7, 0.02, 3.0)]
+    {
+        let mut session = session(&grazed(folder.path(), roughness, height, distance));
+        let mut with = |variant: &str| {
+            let variants = vec!["no-visibility".to_owned(), variant.to_owned()];
+            render_in(&mut session, &graph, &variants, &[], "area.radiance", &shot([24, 14])).0
+        };
+        let exact = with("exact-boundary");
+        let sum = |image: &Image| image.pixels.iter().map(|pixel| f64::from(pixel[1])).sum::<f64>();
+        for (variant, least, most, most_of_pixel) in [
+            ("lorentzian", 0.5, 2.0, 4.0),
+            ("lorentzian-pearson", 0.5, 2.0, 4.0),
+            ("ellipsoid", 0.5, 2.0, 4.0),
+            ("owen", 0.5, 2.0, 4.0),
+            ("ltc", 0.3, 1.5, 4.0),
+            ("mrp", 0.02, 2.0, 8.0),
+        ] {
+            let image = with(variant);
+            let mean = sum(&image) / sum(&exact);
+            // Pixels that are darker than a hundredth of the mean tell little.
+            let floor = 0.01 * sum(&exact) / exact.pixels.len() as f64;
+            let ratios: Vec<f64> =
+                image.pixels.iter().zip(&exact.pixels).map(|(found, exact)| f64::from(found[1]) / f64::from(exact[1]).max(floor)).collect();
+            let brightest = ratios.iter().copied().fold(0.0, f64::max);
+            let lit = exact.pixels.iter().map(|pixel| f64::from(pixel[1]) > 10.0 * floor);
+            let darkest = ratios.iter().zip(lit).filter(|(_, lit)| *lit).map(|(ratio, _)| *ratio).fold(f64::INFINITY, f64::min);
+            eprintln!("roughness {roughness}, height {height}: {variant} mean {mean:.3}, pixels {darkest:.3} to {brightest:.2}");
+            assert!(
+                mean > least && mean < most && brightest < most_of_pixel,
+                "roughness {roughness}, height {height}: {variant} {mean}, pixels {darkest} to {brightest}"
+            );
         }
     }
 }

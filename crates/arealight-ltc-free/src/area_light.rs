@@ -183,7 +183,8 @@ impl Pass for AreaLightPass {
     const NAME: &'static str = "area-light";
     const DOC: &'static str = "Direct light of polygonal, disk and sphere lights in closed form, without tables.\n\
         Light that scatters exactly once. Lambert's formula and the radial primitive of the microfacet distribution, integrated along the outline of each \
-        light (after Lecocq et al. 2017); any simple polygon, ellipses and ellipsoids, one-sided or not. Without visibility nothing casts a shadow.";
+        light (after Lecocq et al. 2017); any simple polygon, ellipses and ellipsoids, one-sided or not. Without visibility nothing casts a shadow. Methods with great \
+        arcs stand for GGX by cosine lobes that end where GGX goes on; for lights beyond (about 7 alpha from the normal in half vectors) GGX is integrated itself.";
     type World = SceneWorld;
     type Params = Params;
     type Inputs = Inputs;

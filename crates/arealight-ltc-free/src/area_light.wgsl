@@ -84,7 +84,16 @@ struct SpecularSum {
     nearest: vec3f,
     // Azimuth that the outline walks about the mirror direction.
     around: AxialMoment,
+    // Largest cosine between the normal and a half vector of the outline, by its great arcs.
+    highest: f32,
 }
+
+#ifdef METHOD_GREAT_ARCS
+#ifndef NDF_PHONG
+// Whether this light lies where the lobes that stand for GGX have nothing left, so that its integral is taken of GGX itself.
+var<private> beyond_lobes: bool = false;
+#endif
+#endif
 
 #ifdef ANISOTROPIC
 fn stretch() -> vec2f {
@@ -167,8 +176,46 @@ fn lobe_mix(alpha: f32) -> LobeMix {
 #endif
 }
 
+// Most that the mix may miss of the distribution where a light begins.
+const LEAST_SHARE: f32 = 0.5;
+
+// Whether the mix is far below the distribution that it stands for, at a cosine to the normal. Its lobes end where GGX goes on: beyond about 7 alpha the mix is next
+// to nothing.
+fn outside_of_mix(cosine: f32, alpha: f32) -> bool {
+#ifdef NDF_PHONG
+    return false;
+#else
+    let mix = lobe_mix(alpha);
+    let z = clamp(cosine, 0.0, 1.0);
+    let logarithm = log(max(z, 1e-30));
+    let powers = exp(min(mix.exponents * logarithm, vec3f(0.0)));
+    let lobes = 0.5 * dot(mix.weights * (mix.exponents + vec3f(2.0)), powers);
+    let square = alpha * alpha;
+    let below = square * z * z + (1.0 - z) * (1.0 + z);
+    return lobes * below * below < LEAST_SHARE * square;
+#endif
+}
+
+// Largest cosine between the normal and a great arc.
+fn highest_of(arc: GreatArc) -> f32 {
+    let foot = clamp(atan2(arc.tangent.z, arc.start.z), 0.0, arc.length);
+    let last = arc.start.z * cos(arc.length) + arc.tangent.z * sin(arc.length);
+    return max(max(arc.start.z, last), arc.start.z * cos(foot) + arc.tangent.z * sin(foot));
+}
+
+// What a cosine lobe about the normal has in a region whose highest point is known, and no more: beyond that cosine the lobe has its power by n + 1. The models of
+// edges are a few thousandths wrong, which is many times too much where nearly nothing is left.
+fn bounded_fraction(moment: AxialMoment, n: f32, highest: f32) -> f32 {
+    let found = lobe_fraction(moment);
+    let most = exp((n + 1.0) * log(clamp(highest, 1e-30, 1.0)));
+    return select(min(found, most), found, moment.walked > 3.14159265);
+}
+
 fn add_half_arc(sum: ptr<function, SpecularSum>, start: vec3f, to: vec3f, mix: LobeMix) {
     let arc = great_arc(start, to);
+    if arc.length > 0.0 {
+        (*sum).highest = max((*sum).highest, highest_of(arc));
+    }
     var first = (*sum).first;
     var second = (*sum).second;
     var third = (*sum).third;
@@ -184,6 +231,14 @@ fn add_half_arc(sum: ptr<function, SpecularSum>, start: vec3f, to: vec3f, mix: L
 
 // An edge in half vectors as great arcs (algorithms 1 and 2).
 fn add_specular(sum: ptr<function, SpecularSum>, arc: GreatArc, viewer: vec3f, alpha: f32) {
+#ifndef NDF_PHONG
+    if beyond_lobes {
+        var ggx = (*sum).ggx;
+        add_ggx_arc(&ggx, arc_of_great_circle(arc), viewer, vec3f(stretch(), alpha));
+        (*sum).ggx = ggx;
+        return;
+    }
+#endif
     let mix = lobe_mix(alpha);
     let last = arc.start * cos(arc.length) + arc.tangent * sin(arc.length);
     let ideal = mirror(viewer);
@@ -213,8 +268,18 @@ fn add_specular(sum: ptr<function, SpecularSum>, arc: GreatArc, viewer: vec3f, a
 }
 
 fn reflected(brdf: Brdf, sum: SpecularSum, viewer: vec3f) -> vec3f {
+#ifndef NDF_PHONG
+    if beyond_lobes {
+        let mean = ggx_mean(sum.ggx, vec3f(stretch(), brdf.alpha));
+        return max(dot(mean, viewer), 0.0) * reflected_at(brdf, safe_normalize(mean, NORMAL), viewer);
+    }
+#endif
     let mix = lobe_mix(brdf.alpha);
-    let fractions = vec3f(lobe_fraction(sum.first), lobe_fraction(sum.second), lobe_fraction(sum.third));
+    let fractions = vec3f(
+        lobe_fraction(sum.first),
+        bounded_fraction(sum.second, mix.exponents.y, sum.highest),
+        bounded_fraction(sum.third, mix.exponents.z, sum.highest),
+    );
     let energy = dot(mix.weights * (mix.exponents + vec3f(2.0)) / (mix.exponents + vec3f(1.0)), fractions);
     // The mirror direction if the light is there, else the direction of the outline that is nearest to it.
     let light = select(sum.nearest, mirror(viewer), sum.around.walked > 3.14159265);
@@ -387,6 +452,16 @@ fn light_from(brdf: Brdf, seen: Outline, frame: SurfaceFrame) -> vec3f {
 #endif
 #endif
     var sum = over_light(outline, frame, brdf.alpha);
+#ifdef SPECULAR
+#ifdef METHOD_GREAT_ARCS
+#ifndef NDF_PHONG
+    beyond_lobes = sum.specular.second.walked <= 3.14159265 && outside_of_mix(sum.specular.highest, brdf.alpha);
+    if beyond_lobes {
+        sum.specular = over_light(outline, frame, brdf.alpha).specular;
+    }
+#endif
+#endif
+#endif
 #ifdef ROUND_SPINNING_QUAD
 #ifdef SPECULAR
     // A quad as wide as the specular lobe wants it has not the area of the light.
@@ -401,6 +476,11 @@ fn light_from(brdf: Brdf, seen: Outline, frame: SurfaceFrame) -> vec3f {
     }
 #endif
     sent += reflected(brdf, sum.specular, frame.viewer);
+#ifdef METHOD_GREAT_ARCS
+#ifndef NDF_PHONG
+    beyond_lobes = false;
+#endif
+#endif
 #endif
     return sent;
 }

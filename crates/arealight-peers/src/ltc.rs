@@ -23,7 +23,8 @@ impl Technique for Ltc {
     const NAME: &'static str = "area-ltc";
     const DOC: &'static str = "Direct light of area lights by linearly transformed cosines.\n\
         Heitz, Dupuy, Hill and Neubelt 2016: the specular lobe is a clamped cosine under a linear map from a table, which is fitted to our own GGX; mapped back, \
-        the light is integrated by Lambert's formula, cut exactly at the horizon. Disks and spheres are polygons of sixteen corners. Refuses the Phong distribution.";
+        the light is integrated by Lambert's formula, cut exactly at the horizon. Disks and spheres are polygons of sixteen corners. Refuses the Phong distribution. In the tail of a sharp \
+        lobe it has lost light: 0.5 of the exact mean on a metal of roughness 0.1 below an overhead light, seen from 2 cm above.";
     const SHADER: Source<'static> = Source {
         path: "crates/arealight-peers/src/shared.wgsl + ltc.wgsl",
         text: concat!(include_str!("shared.wgsl"), include_str!("ltc.wgsl")),

@@ -20,7 +20,8 @@ impl Technique for Mrp {
     const DOC: &'static str = "Direct light of area lights by their most representative point.\n\
         Karis 2013, Real Shading in Unreal Engine 4: the specular lobe sees a point light where the mirror ray comes nearest to the light, times (alpha / alpha')^2 with \
         alpha' = alpha + radius / (2 distance), which keeps about the lobe's energy. Flat lights take the point of their outline nearest to where the ray meets their \
-        plane, and the radius of a disk of their area. The diffuse term is Lambert's exact integral.";
+        plane, and the radius of a disk of their area. The diffuse term is Lambert's exact integral. \
+        Where a light lies in the tail of a sharp lobe it is too dark: 0.03 of the exact mean on a metal of roughness 0.1 below an overhead light, seen from 2 cm above.";
     const SHADER: Source<'static> = Source {
         path: "crates/arealight-peers/src/shared.wgsl + mrp.wgsl",
         text: concat!(include_str!("shared.wgsl"), include_str!("mrp.wgsl")),

@@ -65,7 +65,7 @@ impl SurfaceFormats {
     pub const SPECULAR: TextureFormat = TextureFormat::R32Uint;
     /// Geometric normal, octahedral 2 x 16 bit.
     pub const GEOMETRIC_NORMAL: TextureFormat = TextureFormat::R32Uint;
-    /// Emitted radiance, 9-9-9 bit with shared 5-bit exponent.
+    /// Emitted radiance, 9-9-9 bit with shared 5-bit exponent, times [`lobelia_scene::device::GpuScene::pre_exposure`] (packed words are read back as they are).
     pub const EMISSIVE: TextureFormat = TextureFormat::R32Uint;
 }
 

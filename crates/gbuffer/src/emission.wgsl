@@ -1,6 +1,6 @@
 // Radiance that surfaces emit towards the camera, and the environment where no surface is.
 
-#import lobelia::math::{INV_PI, safe_normalize, storable}
+#import lobelia::math::{HALF_MAX, INV_PI, safe_normalize, storable}
 #import lobelia::packing::unpack_shared_exponent
 #import lobelia::scene::{View, primary_ray}
 
@@ -25,6 +25,8 @@ fn emission(@builtin(global_invocation_id) id: vec3u) {
     if textureLoad(gbuffer_depth, id.xy, 0) > 0.0 {
 #ifdef EMISSIVE
         emitted = unpack_shared_exponent(textureLoad(gbuffer_emissive, id.xy, 0).x);
+        // The most that the packing holds: it was cut off there, and is to be seen as such.
+        emitted = select(emitted, vec3f(HALF_MAX), emitted >= vec3f(65408.0));
 #endif
     } else {
 #ifdef ENVIRONMENT

@@ -32,8 +32,14 @@ impl Scene {
     pub(crate) fn pre_exposure_for(&self, seen: &[SeenPoint]) -> f32 {
         let brightest = self.brightest_emission();
         let usual = self.usual_radiance(seen);
-        // Without light on any surface, emission is all that there is to see.
-        let usual = if usual > 0.0 { usual } else { brightest };
+        // Without light on any surface, emission is all that there is to see, and it need not lie low.
+        let usual = if usual > 0.0 {
+            usual
+        } else if brightest <= MOST {
+            brightest.min(*ORDINARY.end())
+        } else {
+            brightest
+        };
         factor(usual, brightest)
     }
 

@@ -110,7 +110,7 @@ impl Pass for VisibilityPass {
             let words = (MAX_BYTES / (4 * pixels)).min(u64::from(LightVisibility::MAX_CHUNKS) * chunk_words);
             let most = words * 32 * u64::from(shape.interleave).pow(2);
             let help = if most > 0 {
-                format!("use at most {most} lights or a smaller picture, or raise `interleave` here and in the gathering pass")
+                format!("use fewer lights (at most {most}) or a smaller picture, or raise `interleave` here and in the gathering pass")
             } else {
                 "use a smaller picture".to_owned()
             };

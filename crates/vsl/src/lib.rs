@@ -12,7 +12,7 @@
 //! and from both reflectances, weighted by the balance heuristic (Veach and Guibas 1995). Visibility is that of the centre, as in the paper.
 //!
 //! Against the reference of `builtin:cornell-glossy` (240 x 240, exact visibility), the relative MSE of the mean of two frames of 256 lights each is 0.051
-//! (`vpl-gather` 0.172 without clamp, 0.084 with it; 0.065 with one sample, 0.049 with 16), and of two frames of 1024 lights 0.021 (`vpl-gather` with clamp
+//! (`vpl-gather` 0.172 without clamp, 0.084 with one of 10 per square metre; 0.065 with one sample, 0.049 with 16), and of two frames of 1024 lights 0.021 (`vpl-gather` with that clamp
 //! 0.022), at 1.2 to 1.9 times the time of the whole graph on a software device. Fewer neighbours blur less: with 3 in place of 10 it is 0.032 with 256
 //! lights, with 30 0.088; one frame of 1024 has 0.015 with 3, 0.023 with 10 and 0.32 from point lights without clamp. On the scene `ring-caustic` two
 //! frames of 256 with 10 neighbours lose to clamped point lights (0.65 to 0.58), and with 3 win (0.41).
