@@ -60,11 +60,16 @@ pub fn asg_evaluate(eta_x: f64, eta_y: f64, local: DVec3) -> f64 {
 /// Within 1.4 % for all bandwidths, 0.24 % where both are above 5, exact where both are 0 or large; `pi` at 0, 0.
 pub fn asg_integral(eta_x: f64, eta_y: f64) -> f64 {
     let (larger, smaller) = (eta_x.max(eta_y), eta_x.min(eta_y));
+    let [half_x, half_y] = half_sides(larger, smaller);
+    PI * erf_mean(half_x * larger.sqrt()) * erf_mean(half_y * smaller.sqrt())
+}
+
+/// Half sides of the rectangle of area pi that stands for the unit disk under a Gaussian, along the larger bandwidth and along the smaller one.
+pub(crate) fn half_sides(larger: f64, smaller: f64) -> [f64; 2] {
     let square = 0.5 * PI.sqrt();
     let t = larger - smaller;
     let half_y = square + (1.0 - square) * t / (t + 4.0);
-    let half_x = PI / (4.0 * half_y);
-    PI * erf_mean(half_x * larger.sqrt()) * erf_mean(half_y * smaller.sqrt())
+    [PI / (4.0 * half_y), half_y]
 }
 
 /// Integral over the sphere, fast: `pi / sqrt(eta_x eta_y)`, for bandwidths of at least 8 (0.034 %); infinite where one is 0.

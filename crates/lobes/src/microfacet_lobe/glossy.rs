@@ -17,8 +17,7 @@
 
 use super::{NdfLobe, ggx_lobe_one, ggx_lobes_three, ggx_lobes_two, reflection_axis, reflection_lobe_asg};
 use crate::{
-    asg::asg_integral,
-    asg_product::{asg_sg_integral_printed, asg_sg_peak},
+    asg_product::{asg_sg_integral_of_peak, asg_sg_integral_printed, asg_sg_peak},
     brdf::{ggx_distribution, ggx_visibility},
     sg::{sg_evaluate, sg_integral, sg_product},
     sg_cosine::hemisphere_integral,
@@ -36,11 +35,12 @@ fn masked_cosine(alpha: f64, normal: DVec3, view: DVec3, direction: DVec3) -> f6
     if n_dot_l <= 0.0 { 0.0 } else { ggx_visibility(alpha, n_dot_l, n_dot_v) * n_dot_l }
 }
 
-/// One lobe of the NDF times the light, by the peak form of the product; masking and cosine at its peak.
+/// One lobe of the NDF times the light; masking and cosine at the peak of the product.
 fn lobe_shading(alpha: f64, lobe: NdfLobe, normal: DVec3, view: DVec3, light_axis: DVec3, light_sharpness: f64) -> f64 {
     let asg = reflection_lobe_asg(lobe.sharpness, normal, view);
-    let peak = asg_sg_peak(asg.eta_x, asg.eta_y, asg.to_local(light_axis), light_sharpness);
-    let integral = peak.local.z.max(0.0) * peak.log_amplitude.exp() * asg_integral(peak.eta_larger, peak.eta_smaller);
+    let axis = asg.to_local(light_axis);
+    let peak = asg_sg_peak(asg.eta_x, asg.eta_y, axis, light_sharpness);
+    let integral = asg_sg_integral_of_peak(asg.eta_x, asg.eta_y, axis, light_sharpness, &peak);
     lobe.amplitude * masked_cosine(alpha, normal, view, asg.to_world(peak.local)) * integral
 }
 
