@@ -90,8 +90,9 @@ fn asg_sg_peak(eta_x: f32, eta_y: f32, axis_local: vec3f, sharpness: f32) -> Asg
     return AsgPeak(local, log_amplitude, scale * larger, scale * (determinant / (4.0 * larger)), cosine_variance);
 }
 
-// Integral of an ASG times an SG, both of amplitude 1; the SG's axis is in the ASG's frame. Accurate: within STATED of the largest value over axes, for bandwidths and
-// sharpness in [0, 1e8] and all axes, those below the ASG's horizon too. A form of this project.
+// Integral of an ASG times an SG, both of amplitude 1; the SG's axis is in the ASG's frame. Accurate: within 5 % of the largest value over axes, for bandwidths and
+// sharpness in [0, 1e8] and all axes, those below the ASG's horizon too; 2 % from a sharpness of 10 on. Rounding adds 1e-5 + 8e-7 x for a value of exp(-x). A form of
+// this project.
 fn asg_sg_integral(eta_x: f32, eta_y: f32, axis_local: vec3f, sharpness: f32) -> f32 {
     return asg_sg_integral_of_peak(eta_x, eta_y, axis_local, sharpness, asg_sg_peak(eta_x, eta_y, axis_local, sharpness));
 }

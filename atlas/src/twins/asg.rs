@@ -144,7 +144,7 @@ pub fn twins() -> Vec<Twin> {
             expected: |row| {
                 let (axis, sharpness) = (direction_of(row, 0), row[3]);
                 let exponent = asg_sg_peak(row[4], row[5], axis, sharpness).log_amplitude.abs();
-                vec![Expected::relative(asg_sg_integral(row[4], row[5], axis, sharpness), 3e-6 + 8e-7 * exponent).non_negative()]
+                vec![Expected::relative(asg_sg_integral(row[4], row[5], axis, sharpness), 1e-5 + 8e-7 * exponent).non_negative()]
             },
         },
         Twin {

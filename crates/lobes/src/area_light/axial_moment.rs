@@ -211,7 +211,8 @@ pub fn arvo_integral(length: f64, c: f64, foot: f64, order: f64, odd: bool) -> f
             if versine == 0.0 { 0.5 * (order + 2.0) } else { -((order + 2.0) * log).exp_m1() / versine }
         }
     };
-    integrate_adaptive(-foot, length - foot, 1e-14, integrand)
+    // From 0, since the ends of a short arc far from the foot are equal but for rounding.
+    integrate_adaptive(0.0, length, 1e-14, |along| integrand(along - foot))
 }
 
 /// The same for a whole order by Arvo's recurrence, at a cost that grows with it (Arvo 1995, Applications of Irradiance Tensors).

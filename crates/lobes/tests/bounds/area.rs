@@ -7,7 +7,11 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// Of an edge, in lobe fractions.
 fn owen_error(p: &[f64], nodes: u32) -> f64 {
-    let (s, n) = (log_uniform(p[0], 1e-7, 1.0), log_uniform(p[3], 6.0, 1e6));
+    edge_error(p, log_uniform(p[3], 6.0, 1e6), nodes)
+}
+
+fn edge_error(p: &[f64], n: f64, nodes: u32) -> f64 {
+    let s = log_uniform(p[0], 1e-7, 1.0);
     let (mut low, mut high) = (FRAC_PI_2 * (2.0 * p[1] - 1.0), FRAC_PI_2 * (2.0 * p[2] - 1.0));
     if low > high {
         (low, high) = (high, low);
@@ -46,11 +50,24 @@ macro_rules! bound {
 /// All of them.
 pub fn bounds() -> Vec<Bound> {
     vec![
-        bound!("Owen, 2 nodes", "an edge; n 6 to 1e6", "quadrature, in lobe fractions", 3e-4, 4, |p| owen_error(p, 2)),
-        bound!("Owen, 3 nodes", "an edge; n 6 to 1e6", "quadrature, in lobe fractions", 3e-5, 4, |p| owen_error(p, 3)),
-        bound!("Owen, 4 nodes", "an edge; n 6 to 1e6", "quadrature, in lobe fractions", 2e-5, 4, |p| owen_error(p, 4)),
-        bound!("Owen, 6 nodes", "an edge; n 6 to 1e6", "quadrature, in lobe fractions", 2e-5, 4, |p| owen_error(p, 6)),
-        bound!("solid_angle", "rectangles of sides 1e-8 to 1 at distance 1, turned", "closed form, over what rounded corners leave", 2e-15, 5, solid_angle_error),
+        bound!("Owen, 2 nodes", "an edge; n 6 to 1e6", "quadrature, in lobe fractions", 5e-4, 4, |p| owen_error(p, 2))
+            .at(&[&[0.81876, 0.48285, 0.51715, 0.19936]]),
+        bound!("Owen, 3 nodes", "an edge; n 6 to 1e6", "quadrature, in lobe fractions", 4.5e-5, 4, |p| owen_error(p, 3))
+            .at(&[&[0.81876, 0.48285, 0.51715, 0.19936]]),
+        bound!("Owen, 4 nodes", "an edge; n 6 to 1e6", "quadrature, in lobe fractions", 2.7e-5, 4, |p| owen_error(p, 4))
+            .at(&[&[0.93854, 0.9935, 0.00215, 0.0]]),
+        bound!("Owen, 6 nodes", "an edge; n 6 to 1e6", "quadrature, in lobe fractions", 2.7e-5, 4, |p| owen_error(p, 6))
+            .at(&[&[0.93854, 0.9935, 0.00215, 0.0]]),
+        bound!("Owen, any nodes", "an edge; n 0 to 6", "quadrature, in lobe fractions", 1.2e-4, 4, |p| edge_error(p, 5.999 * p[3], 3))
+            .at(&[&[0.9446, 1.0, 0.0, 1.0]]),
+        bound!(
+            "solid_angle",
+            "rectangles of sides 1e-8 to 1 at distance 1, turned",
+            "closed form, over what rounded corners leave",
+            2e-15,
+            5,
+            solid_angle_error
+        ),
         bound!("arvo_recurrence", "arcs of 1e-12 to 1.5, c 1e-3 to 1, order 0 to 40", "quadrature", 1e-10, 4, recurrence_error),
     ]
 }

@@ -9,15 +9,15 @@ mod search;
 
 use search::{Bound, search};
 
-/// Searches all of them; a bound must hold, and be no more than three times what is found, for else it says too little.
+/// Searches all of them; a bound must hold, and be no more than three times what is found, for else it says too little (but for exact forms, whose bound is rounding).
 fn check(bounds: &[Bound]) {
-    let samples = std::env::var("LOBELIA_SEARCH").ok().and_then(|text| text.parse().ok()).unwrap_or(160);
+    let samples = std::env::var("LOBELIA_SEARCH").ok().and_then(|text| text.parse().ok()).unwrap_or(40);
     println!("| function | domain | compared with | stated | found | at |\n|---|---|---|---:|---:|---|");
     let mut failed = Vec::new();
     for bound in bounds {
         let (found, at) = search(bound, samples, 7);
         println!("| {} | {} | {} | {:.2e} | {found:.2e} | {at:.5?} |", bound.name, bound.domain, bound.reference, bound.stated);
-        if found > bound.stated || found < bound.stated / 3.0 {
+        if found > bound.stated || (bound.stated > 1e-9 && found < bound.stated / 3.0) {
             failed.push(format!("{} over {}: {found:.3e}, stated {:.3e}, at {at:?}", bound.name, bound.domain, bound.stated));
         }
     }

@@ -47,6 +47,13 @@ pub struct Bound {
     pub worst: &'static [&'static [f64]],
 }
 
+impl Bound {
+    /// With points that are always tried.
+    pub fn at(self, worst: &'static [&'static [f64]]) -> Self {
+        Self { worst, ..self }
+    }
+}
+
 /// The largest error that is found, and where. NaN counts as infinite.
 pub fn search(bound: &Bound, samples: usize, seed: u64) -> (f64, Vec<f64>) {
     let mut numbers = Numbers(seed);
@@ -72,10 +79,13 @@ pub fn search(bound: &Bound, samples: usize, seed: u64) -> (f64, Vec<f64>) {
     for (value, point) in &mut best {
         let mut step = 0.1;
         for _ in 0..samples / 8 {
-            let tried: Vec<f64> = point
-                .iter()
-                .map(|coordinate| if numbers.next() < 0.5 { *coordinate } else { (coordinate + step * (2.0 * numbers.next() - 1.0)).clamp(0.0, 1.0) })
-                .collect();
+            let tried: Vec<f64> =
+                point
+                    .iter()
+                    .map(|coordinate| {
+                        if numbers.next() < 0.5 { *coordinate } else { (coordinate + step * (2.0 * numbers.next() - 1.0)).clamp(0.0, 1.0) }
+                    })
+                    .collect();
             let found = error(&tried);
             if found > *value {
                 (*value, *point) = (found, tried);
