@@ -223,9 +223,9 @@ pub fn arvo_recurrence(length: f64, c: f64, foot: f64, order: u32) -> f64 {
     let (sines, cosines) = (2.0 * half * (0.5 * length - foot).cos(), -2.0 * half * (0.5 * length - foot).sin());
     let growth = cosines / low.cos();
     let ends = |power: i32| {
-        if growth.abs() < 0.5 {
-            let grown = (f64::from(power) * growth.ln_1p()).exp_m1();
-            (c * low.cos()).powi(power) * c * (grown * high.sin() + sines)
+        let log_growth = f64::from(power) * growth.max(-0.5).ln_1p();
+        if growth.abs() < 0.5 && log_growth.abs() < 1.0 {
+            (c * low.cos()).powi(power) * c * (log_growth.exp_m1() * high.sin() + sines)
         } else {
             (c * high.cos()).powi(power) * c * high.sin() - (c * low.cos()).powi(power) * c * low.sin()
         }
