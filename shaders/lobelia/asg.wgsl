@@ -185,7 +185,7 @@ fn bounded_gaussian(eta: f32, slope: f32, half: f32) -> f32 {
     return 0.886226925 / root * exp(shift * shift) * (erf(root * half - shift) + erf(root * half + shift));
 }
 
-// The same integral as Xu et al. 2013 print it: within 5 % for a sharpness of at least 10 and narrow ASGs, wrong for broad SGs. Where bandwidths and
+// The same integral as Xu et al. 2013 print it: within 5.4 % for a sharpness of at least 10 and bandwidths of at least 1, wrong for broad SGs. Where bandwidths and
 // sharpness are all near 0 the quotients are kept finite.
 fn asg_sg_integral_printed(eta_x: f32, eta_y: f32, axis_local: vec3f, sharpness: f32) -> f32 {
     let nu = 0.5 * sharpness;

@@ -76,6 +76,20 @@ pub fn bounds() -> Vec<Bound> {
             let from = ((p[2] * (1e3f64).ln() + (1e4f64).ln()) / (share + (1e3f64).ln())).min(1.0);
             asg_sg_error(&[p[0], p[1], from, p[3], p[4]], asg_sg_integral)
         }),
+        bound!(
+            "asg_sg_integral_printed",
+            "sharpness 10 to 1e4, bandwidths 1 to 1e4",
+            "quadrature, over the value at the ASG's axis",
+            0.054,
+            5,
+            |p| {
+                let [x, y] = [p[0], p[1]].map(|share| log_uniform(share, 1.0, 1e4));
+                let (sharpness, axis) = (log_uniform(p[2], 10.0, 1e4), direction(p[3], p[4]));
+                let error = asg_sg_integral_printed(x, y, axis, sharpness) - asg_sg_integral_exact(x, y, axis, sharpness);
+                error.abs() / asg_sg_integral_exact(x, y, DVec3::Z, sharpness)
+            }
+        )
+        .at(&[&[0.178, 0.0949, 0.0, 0.8809, 0.75]]),
         bound!("asg_integral", "bandwidths 0, 1e-6 to 1e8", "quadrature", 0.0145, 2, |p| asg_integral_error(
             sharpness(p[0]),
             sharpness(p[1]),
