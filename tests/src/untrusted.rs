@@ -59,7 +59,7 @@ fn overrides(bytes: &[u8]) -> bool {
     let Ok(overrides) = lines.map(str::parse).collect::<Result<Vec<Override>, _>>() else { return false };
     let graphs: PathBuf = crate::root().join("graphs/indirect.ron");
     let address = format!("{}{}", graphs.display(), variants);
-    lobelia::trial::technique(&address, &overrides, &lobelia::registry()).is_ok()
+    lobelia::trial::techniques(&[address], &overrides, &lobelia::registry()).is_ok()
 }
 
 fn with_file(bytes: &[u8], ending: &str, read: impl FnOnce(&Path) -> bool) -> bool {
