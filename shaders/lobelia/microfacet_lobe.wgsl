@@ -7,7 +7,7 @@
 #import lobelia::brdf::{ggx_visibility, phong_visibility}
 #import lobelia::sg::{SphericalGaussian, sg_integral, sg_product}
 #import lobelia::sg_cosine::hemisphere_integral
-#import lobelia::asg::{AnisotropicSphericalGaussian, asg_integral, asg_sg_integral_printed, asg_sg_peak, asg_to_local}
+#import lobelia::asg::{AnisotropicSphericalGaussian, asg_sg_integral_of_peak, asg_sg_integral_printed, asg_sg_peak, asg_to_local}
 
 // An SG about the normal that stands for an NDF, or for a part of one.
 struct NdfLobe {
@@ -152,8 +152,9 @@ fn masked_cosine(alpha: f32, normal: vec3f, view: vec3f, direction: vec3f) -> f3
 
 fn lobe_shading(alpha: f32, lobe: NdfLobe, normal: vec3f, view: vec3f, light_axis: vec3f, light_sharpness: f32) -> f32 {
     let asg = reflection_lobe_asg(lobe.sharpness, normal, view);
-    let peak = asg_sg_peak(asg.eta_x, asg.eta_y, asg_to_local(asg, light_axis), light_sharpness);
-    let integral = max(peak.local.z, 0.0) * exp(peak.log_amplitude) * asg_integral(peak.eta_larger, peak.eta_smaller);
+    let axis = asg_to_local(asg, light_axis);
+    let peak = asg_sg_peak(asg.eta_x, asg.eta_y, axis, light_sharpness);
+    let integral = asg_sg_integral_of_peak(asg.eta_x, asg.eta_y, axis, light_sharpness, peak);
     let direction = asg.tangent * peak.local.x + asg.bitangent * peak.local.y + asg.axis * peak.local.z;
     return lobe.amplitude * masked_cosine(alpha, normal, view, direction) * integral;
 }

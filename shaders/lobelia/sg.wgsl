@@ -81,7 +81,7 @@ fn sg_product_integral(axis_a: vec3f, sharpness_a: f32, axis_b: vec3f, sharpness
     return exp(product.log_amplitude) * sg_integral(product.sharpness);
 }
 
-// The fast form, an SG of either axis: within 2 % of the peak over all axes where the sum of sharpnesses is above 10. For a sum > 0.
+// The fast form, an SG of either axis: within 2.5 % of the peak over all axes where the sum of sharpnesses is above 10. For a sum > 0.
 fn sg_product_integral_fast(axis_a: vec3f, sharpness_a: f32, axis_b: vec3f, sharpness_b: f32) -> f32 {
     let sum = sharpness_a + sharpness_b;
     let d = axis_a - axis_b;

@@ -26,7 +26,7 @@ fn hemisphere_integral(sharpness: f32, c: f32) -> f32 {
     return TAU * decay_mean(sharpness) * (e + (1.0 - e) * clamp(share, 0.0, 1.0));
 }
 
-// Integral of G over the hemisphere, fast: A (1 + erf(c sqrt(sharpness/2))) / 2. Within 0.007 A above sharpness 10, 0.14 A below.
+// Integral of G over the hemisphere, fast: A (1 + erf(c sqrt(sharpness/2))) / 2. Within 0.0074 A above sharpness 10, 0.14 A below.
 fn hemisphere_integral_fast(sharpness: f32, c: f32) -> f32 {
     return 0.5 * sg_integral(sharpness) * erfc(-c * sqrt(0.5 * sharpness));
 }

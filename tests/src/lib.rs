@@ -1,5 +1,7 @@
 //! What the pipeline tests share: the reference images, where they are present, and rendering in one call.
 
+pub mod untrusted;
+
 use lobelia::{Session, Shot, graph::GraphFile, measure::Image, scene::Ndf};
 use std::{
     path::{Path, PathBuf},

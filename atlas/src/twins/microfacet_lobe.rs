@@ -10,8 +10,8 @@ use crate::{
 };
 use glam::DVec3;
 use lobelia_lobes::{
-    asg::{AnisotropicSphericalGaussian, asg_integral},
-    asg_product::{asg_sg_integral_printed, asg_sg_peak},
+    asg::AnisotropicSphericalGaussian,
+    asg_product::{asg_sg_integral_of_peak, asg_sg_integral_printed, asg_sg_peak},
     brdf::{ggx_visibility, phong_exponent},
     microfacet_lobe::*,
     sg::{sg_integral, sg_product},
@@ -152,12 +152,12 @@ impl Scene {
         // The slope of the exponent, as a function of the light's axis, is that of the light's lobe at the peak. A peak near the lobe's horizon has a
         // cosine that is as well known as that of the axis.
         let turned = 3.0 * COSINE * self.sharpness * (peak.local - local).length();
-        let relative = 4e-6
+        let relative = 1.2e-5
             + 1e-6 * x
             + turned
             + stretch_error(lobe.sharpness, self.normal, self.view) * (1.0 + x)
             + 3.0 * COSINE / local.z.abs().max(1e-30);
-        let integral = peak.local.z.max(0.0) * peak.log_amplitude.exp() * asg_integral(peak.eta_larger, peak.eta_smaller);
+        let integral = asg_sg_integral_of_peak(asg.eta_x, asg.eta_y, local, self.sharpness, &peak);
         let (most, least) = self.masking(asg.to_world(peak.local), 5.0 * COSINE);
         lobe.amplitude * integral * (most * relative + most - least)
     }

@@ -5,7 +5,11 @@ use crate::{
     twin::{Expected, Row, Twin},
 };
 use glam::DVec3;
-use lobelia_lobes::{asg_product::asg_sg_peak, sg_cosine::clamped_cosine_integral, sg_light::*};
+use lobelia_lobes::{
+    asg_product::{asg_sg_integral, asg_sg_peak},
+    sg_cosine::clamped_cosine_integral,
+    sg_light::*,
+};
 
 /// A distance of 1e-3 to 1e4 m and a radius of 1e-12 to 30 times that; either or both may be 0.
 fn distance_and_radius(draw: &mut Draw) -> [f64; 2] {
@@ -199,7 +203,11 @@ fn value(input: Input) -> vec4f { return vec4f(cone_irradiance(input.a.x, input.
             let slope = sharpness * (axis - peak.local).abs();
             let cosine = if sharpness < 1e8 { peak.local.z } else { axis.z };
             let exponent = peak.log_amplitude.abs();
-            light.expected(light.with(vsgl_kernel), exponent, slope, cosine)
+            let expected = light.expected(light.with(vsgl_kernel), exponent, slope, cosine);
+            // As for `asg_sg_integral`: what an axis far below the horizon leaves counts against the value along the ASG's axis.
+            let [here, along] = [axis, DVec3::Z].map(|axis| asg_sg_integral(light.eta[0], light.eta[1], axis, sharpness));
+            let most = expected.value * (along / here.max(1e-300)).min(1e30);
+            Expected { bound: expected.bound + 7e-6, scale: expected.scale.max(1e-4 * most), ..expected }
         }),
         of_light!("vsgl_kernel_diffuse_receiver", "input.a.xyz, input.a.w, input.b.xyz, input.b.w, input.c.z", |light| {
             let (_, length, sum, exponent) = light.product();

@@ -130,7 +130,7 @@ pub fn sg_product_integral_printed(axis_a: DVec3, sharpness_a: f64, axis_b: DVec
 /// The fast form `2 pi / (a + b) exp(-a b / (a + b) |axis_a - axis_b|^2 / 2)` for sharpnesses a and b (Iwasaki et al. 2012, Interactive Bi-scale Editing
 /// of Highly Glossy Materials).
 ///
-/// Off by up to 2 % of the product's peak over all axes where the sum is above 10, 18 % where both are 1, and infinite where both are 0; its relative error grows
+/// Off by up to 2.5 % of the product's peak over all axes where the sum is above 10, 18 % where both are 1, and infinite where both are 0; its relative error grows
 /// without bound off the axis when both lobes are sharp. Its merit is closure: seen as a function of one axis it is an SG again.
 pub fn sg_product_integral_fast(axis_a: DVec3, sharpness_a: f64, axis_b: DVec3, sharpness_b: f64) -> f64 {
     let sum = sharpness_a + sharpness_b;

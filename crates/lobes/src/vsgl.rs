@@ -156,7 +156,7 @@ impl SgReceiver {
 }
 
 /// `E[max(n.w, 0)]` over normals n about a mean of length `sqrt(1 - spread)`, c the cosine with the mean's axis: a hyperbola between `max(c, 0)` at spread 0 and
-/// 0.28 (exact: 0.25) at 1. Within 0.03.
+/// 0.28 (exact: 0.25) at 1. Within 0.05 for normals that are distributed as an SG.
 pub fn spread_cosine(c: f64, spread: f64) -> f64 {
     let mean = c * (1.0 - spread).max(0.0).sqrt();
     0.5 * (mean + (mean * mean + 0.32 * spread).sqrt())

@@ -17,12 +17,24 @@ pub enum Precision {
     Float,
 }
 
+/// Most pixels of a picture that is read: 16384 x 16384.
+const MAX_PIXELS: usize = 1 << 28;
+
 fn failure(path: &Path, reason: impl std::fmt::Display) -> MeasureError {
     MeasureError::File { file: path.display().to_string(), reason: reason.to_string() }
 }
 
 /// Reads the R, G, B channels of the first layer that has them; half or float.
 pub fn read_exr(path: &Path) -> Result<Image, MeasureError> {
+    // What a header declares is asked for in one piece; a damaged one asks for more than there is.
+    let unreadable = |error: &dyn std::fmt::Display| failure(path, format!("cannot be read as an EXR picture: {error}"));
+    let meta = exr::meta::MetaData::read_from_file(path, false).map_err(|error| unreadable(&error))?;
+    for header in &meta.headers {
+        let size = header.layer_size;
+        if size.width().checked_mul(size.height()).is_none_or(|pixels| pixels > MAX_PIXELS) {
+            return Err(failure(path, format!("it declares {} x {} pixels; at most {MAX_PIXELS} are read", size.width(), size.height())));
+        }
+    }
     let read = files::read_first_rgba_layer_from_file(
         path,
         |resolution, _| (resolution.width(), vec![[0.0f32; 3]; resolution.width() * resolution.height()]),

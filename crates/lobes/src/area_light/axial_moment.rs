@@ -166,9 +166,28 @@ pub fn two_axis_moment(light: &Boundary, normal: DVec3, axis: DVec3, w: DVec3, n
     (w.dot(axis) * scaled_moment(&region, axis, n + 1.0) - edges) / (n + 2.0)
 }
 
-/// Solid angle, sr, of the part above the plane of `normal`, or of all.
+/// Solid angle, sr, of the part above the plane of `normal`, or of all: that of a polygon as the sum of triangles about its first corner (Van Oosterom and
+/// Strackee 1983, The Solid Angle of a Plane Triangle), to rounding however small it is. Positive for an outline that runs counter-clockwise.
 pub fn solid_angle(light: &Boundary, normal: Option<DVec3>) -> f64 {
-    if light.is_empty() { 0.0 } else { axial_moment(light, normal, light.facing, 0.0) }
+    if light.is_empty() {
+        return 0.0;
+    }
+    let above = normal.map_or_else(|| light.clone(), |normal| light.clip(normal));
+    let corner = |piece: &Piece| match *piece {
+        Piece::Segment { from, .. } => Some(from),
+        Piece::Arc { .. } => None,
+    };
+    let Some(corners) = above.pieces.iter().map(corner).collect::<Option<Vec<DVec3>>>() else {
+        return axial_moment(light, normal, light.facing, 0.0);
+    };
+    let triangle = |a: DVec3, b: DVec3, c: DVec3| {
+        let (la, lb, lc) = (a.length(), b.length(), c.length());
+        // The triple product from differences: the corners of a small triangle are nearly parallel.
+        let volume = -a.dot((b - a).cross(c - a));
+        2.0 * volume.atan2(la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb)
+    };
+    let Some(first) = corners.first() else { return 0.0 };
+    corners.windows(2).skip(1).map(|pair| triangle(*first, pair[0], pair[1])).sum()
 }
 
 /// Lobe fraction: `(n+1) M / 2 pi`.
@@ -192,13 +211,25 @@ pub fn arvo_integral(length: f64, c: f64, foot: f64, order: f64, odd: bool) -> f
             if versine == 0.0 { 0.5 * (order + 2.0) } else { -((order + 2.0) * log).exp_m1() / versine }
         }
     };
-    integrate_adaptive(-foot, length - foot, 1e-14, integrand)
+    // From 0, since the ends of a short arc far from the foot are equal but for rounding.
+    integrate_adaptive(0.0, length, 1e-14, |along| integrand(along - foot))
 }
 
 /// The same for a whole order by Arvo's recurrence, at a cost that grows with it (Arvo 1995, Applications of Irradiance Tensors).
 pub fn arvo_recurrence(length: f64, c: f64, foot: f64, order: u32) -> f64 {
     let (low, high) = (-foot, length - foot);
-    let ends = |power: i32| (c * high.cos()).powi(power) * c * high.sin() - (c * low.cos()).powi(power) * c * low.sin();
+    // The difference of cos^k sin at both ends, which are nearly equal for a short arc: that of the sines and that of the cosines' powers.
+    let half = (0.5 * length).sin();
+    let (sines, cosines) = (2.0 * half * (0.5 * length - foot).cos(), -2.0 * half * (0.5 * length - foot).sin());
+    let growth = cosines / low.cos();
+    let ends = |power: i32| {
+        let log_growth = f64::from(power) * growth.max(-0.5).ln_1p();
+        if growth.abs() < 0.5 && log_growth.abs() < 1.0 {
+            (c * low.cos()).powi(power) * c * (log_growth.exp_m1() * high.sin() + sines)
+        } else {
+            (c * high.cos()).powi(power) * c * high.sin() - (c * low.cos()).powi(power) * c * low.sin()
+        }
+    };
     let odd = order % 2 == 1;
     // Integrals of z^k: k z_k = [z^(k-1) c sin] + (k-1) c^2 z_(k-2).
     let mut power = if odd { ends(0) } else { length };
