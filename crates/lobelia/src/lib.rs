@@ -37,6 +37,7 @@ pub use lobelia_vsgl as vsgl;
 pub use lobelia_vsl as vsl;
 
 pub mod explain;
+pub mod exposure;
 pub mod light;
 mod session;
 pub mod sweep;
