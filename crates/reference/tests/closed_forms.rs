@@ -4,7 +4,7 @@
 use base64::Engine as _;
 use glam::DVec3;
 use lobelia_reference::{LightPaths, Picture, Render, Settings};
-use lobelia_scene::{Camera, Environment, Scene};
+use lobelia_scene::{Camera, Environment, LightClass, LightTransport, Scene};
 use std::f64::consts::PI;
 
 const ALBEDO: f64 = 0.5;
@@ -19,9 +19,12 @@ fn scene(nodes: &str, lights: &str, material: &str) -> Scene {
         }
     }
     bytes.extend([0u16, 1, 2, 0, 2, 3].iter().flat_map(|index| index.to_le_bytes()));
+    // The nodes after the floor.
+    let count = serde_json::from_str::<Vec<serde_json::Value>>(&format!("[{nodes}]")).unwrap().len();
+    let list = (0..=count).map(|node| node.to_string()).collect::<Vec<_>>().join(", ");
     let data = base64::engine::general_purpose::STANDARD.encode(&bytes);
     let text = format!(
-        r#"{{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [0, 1]}}],
+        r#"{{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [{list}]}}],
         "extensionsUsed": ["KHR_lights_punctual", "KHR_materials_emissive_strength"],
         "extensions": {{"KHR_lights_punctual": {{"lights": [{lights}]}}}},
         "nodes": [{{"mesh": 0}}, {nodes}],
@@ -50,8 +53,13 @@ const DARK: &str = r#"{"pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1],
 
 /// Irradiance at the origin, from the mean of a small picture of the floor there; the camera looks from the side, below every light.
 fn irradiance(scene: &Scene, samples: u64) -> DVec3 {
+    irradiance_of(scene, LightPaths::Direct, samples)
+}
+
+/// The same of some light only.
+fn irradiance_of(scene: &Scene, paths: LightPaths, samples: u64) -> DVec3 {
     let camera = Camera::look_at("c", DVec3::new(0.3, 0.4, 5.0), DVec3::ZERO, DVec3::Y, 1e-4, 0.01).unwrap();
-    let settings = Settings { size: [8, 8], paths: LightPaths::Direct, samples, seed: 1 };
+    let settings = Settings { size: [8, 8], paths, samples, seed: 1 };
     let mut render = Render::new(scene, &camera, settings).unwrap();
     while render.done() < render.passes() {
         render.step();
@@ -160,4 +168,30 @@ fn an_environment_and_what_stands_before_it() {
     covered.environment = open.environment.clone();
     let left = 1.0 - 4.0 * corner_factor(0.5, 0.5, 1.0);
     close(irradiance(&covered, 1024), DVec3::new(0.5, 1.0, 1.5) * PI * left, 2e-3);
+}
+
+/// All four classes over one floor, each where it hides no other: alone, each gives what is known for it, with the same numbers as among the others.
+#[test]
+fn each_class_of_lights_alone() {
+    let lamp = r#"{"pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1], "metallicFactor": 0}, "emissiveFactor": [1, 0.5, 0.25]}"#;
+    let nodes = [
+        r#"{"translation": [3, 4, 0], "extensions": {"KHR_lights_punctual": {"light": 0}}}"#.to_owned(),
+        // The emissive square looks down from 1.5 m at the side.
+        r#"{"mesh": 1, "translation": [0, 1.5, 2], "rotation": [1, 0, 0, 0]}"#.to_owned(),
+        area_light(r#""shape": "disk", "radius": 0.5"#, ""),
+    ];
+    let mut all = scene(&nodes.join(", "), r#"{"type": "point", "intensity": 50}"#, lamp);
+    all.environment =
+        Some(Environment { name: "even".into(), width: 16, height: 8, pixels: vec![glam::Vec3::splat(0.5); 128], scale: 1.0 });
+    let of = |class: LightClass| irradiance_of(&all, LightPaths::Only(LightTransport::of(class, [1])), 1024);
+    close(of(LightClass::Punctual), DVec3::splat(50.0 / 25.0 * 0.8), 5e-6);
+    close(of(LightClass::Area), DVec3::new(2.0, 4.0, 6.0) * PI * 0.25 / 1.25, 2e-3);
+    // A rectangle whose corners lie at x = +-0.5, z = 1.5 and 2.5 over the receiver: what reaches to 2.5 less what reaches to 1.5.
+    let factor = 2.0 * (corner_factor(0.5, 2.5, 1.5) - corner_factor(0.5, 1.5, 1.5));
+    close(of(LightClass::Emissive), DVec3::new(1.0, 0.5, 0.25) * PI * factor, 2e-3);
+    // The sky without what the disk and the square hide of it.
+    let open = 1.0 - 0.25 / 1.25 - factor;
+    close(of(LightClass::Environment), DVec3::splat(0.5 * PI * open), 5e-3);
+    let sum: DVec3 = LightClass::ALL.into_iter().map(of).sum();
+    close(irradiance_of(&all, LightPaths::Direct, 1024), sum, 1e-6);
 }

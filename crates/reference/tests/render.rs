@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 use lobelia_reference::{Checkpoint, LightPaths, Picture, ReferenceError, Render, Settings};
-use lobelia_scene::{Environment, Scene};
+use lobelia_scene::{Environment, LightClass, LightTransport, Scene};
 
 fn settings(paths: LightPaths, samples: u64) -> Settings {
     Settings { size: [24, 16], paths, samples, seed: 3 }
@@ -65,6 +65,7 @@ fn checkpoints_of_something_else_and_broken_ones_are_refused() {
     warm.materials[0].base_color.x *= 0.5;
     for (what, mut other) in [
         ("paths", start(&scene, settings(LightPaths::OneBounce, 32))),
+        ("light", start(&scene, settings(LightPaths::Only(LightTransport::of(LightClass::Punctual, [1])), 32))),
         ("material", start(&warm, settings(LightPaths::Direct, 32))),
         ("size", start(&scene, Settings { size: [16, 24], ..settings(LightPaths::Direct, 32) })),
     ] {
@@ -93,6 +94,8 @@ fn settings_out_of_range_are_refused() {
         Settings { size: [1 << 16, 1 << 16], ..settings(LightPaths::Direct, 1) },
         settings(LightPaths::Direct, 0),
         settings(LightPaths::Full { depth: 0 }, 1),
+        settings(LightPaths::Only(LightTransport::nothing()), 1),
+        settings(LightPaths::Only(LightTransport::of_all([1001])), 1),
     ] {
         assert!(matches!(Render::new(&scene, &camera, bad), Err(ReferenceError::Settings(_))), "{bad:?}");
     }
@@ -153,4 +156,38 @@ fn light_paths_add_up() {
     let (direct, one, two) = (of(LightPaths::Direct), of(LightPaths::OneBounce), of(LightPaths::Full { depth: 2 }));
     let seen = of(LightPaths::Full { depth: 1 }) - direct;
     assert!(one > 0.05 * direct && ((direct + one + seen) / two - 1.0).abs() < 0.01, "{direct} {one} {seen} {two}");
+}
+
+/// A picture is the sum of those of its classes of lights and of its numbers of scattering events: of the same random numbers to rounding, of others within noise.
+#[test]
+fn classes_of_lights_add_up() {
+    let mut scene = Scene::load("builtin:area-lights").unwrap();
+    scene.lights = Scene::load("builtin:cornell-glossy").unwrap().lights;
+    scene.environment = Some(Environment { name: "even".into(), width: 8, height: 4, pixels: vec![Vec3::splat(0.3); 32], scale: 1.0 });
+    // Some surface that is no area light's.
+    let ordinary = scene.instances.iter().find(|instance| instance.area_light.is_none()).unwrap();
+    let material = scene.meshes[ordinary.mesh].material;
+    scene.materials[material].emissive = Vec3::new(0.4, 0.2, 0.1);
+    let traits = scene.traits();
+    assert!(LightClass::ALL.into_iter().all(|class| traits.lights_of(class) > 0), "{traits:?}");
+    let of = |light: LightTransport, seed: u32| finish(start(&scene, Settings { seed, ..settings(LightPaths::Only(light), 64) }));
+    let all = LightTransport::of_all(0..=3);
+    let whole = of(all, 3);
+    let parts: Vec<Picture> = all.parts().map(|(_, part)| of(part, 3)).collect();
+    assert!(
+        parts.len() == 4 && parts.iter().all(|part| mean(part) > 0.01 * mean(&whole)),
+        "{:?}",
+        parts.iter().map(mean).collect::<Vec<_>>()
+    );
+    for (index, value) in whole.pixels.as_flattened().iter().enumerate() {
+        let sum: f32 = parts.iter().map(|part| part.pixels.as_flattened()[index]).sum();
+        assert!((sum - value).abs() <= 2e-5 * value.abs() + 1e-6, "{index}: {sum} {value}");
+    }
+    // All classes by this way are what the depth alone asks for.
+    assert_eq!(finish(start(&scene, settings(LightPaths::Full { depth: 3 }, 64))).pixels, whole.pixels);
+    // Other seeds, and single numbers of scattering events.
+    let counts: f64 = (0..=3).map(|count| mean(&of(LightTransport::of_all([count]), 20 + count))).sum();
+    assert!((counts / mean(&whole) - 1.0).abs() < 0.03, "{counts} {}", mean(&whole));
+    let classes: f64 = all.parts().enumerate().map(|(index, (_, part))| mean(&of(part, 30 + index as u32))).sum();
+    assert!((classes / mean(&whole) - 1.0).abs() < 0.03, "{classes} {}", mean(&whole));
 }

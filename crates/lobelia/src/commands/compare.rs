@@ -283,10 +283,7 @@ pub fn compared_light(
         let settings = Settings { size, paths: LightPaths::Only(*part), samples: SHARE_SAMPLES, seed: REFERENCE_SEED };
         let mean = match part.is_nothing() {
             true => 0.0,
-            false => measure::mean(&truth::truth(scene, &camera, settings, None, None, &mut |_| true)?.image)
-                .iter()
-                .map(|value| f64::from(*value))
-                .sum(),
+            false => measure::mean(&truth::truth(scene, &camera, settings, None, None, &mut |_| true)?.image).iter().sum(),
         };
         known.push((*part, mean));
         Ok(mean)
