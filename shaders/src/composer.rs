@@ -164,12 +164,10 @@ fn last(path: &str) -> &str {
     path.rsplit("::").next().unwrap_or(path)
 }
 
-fn nearest<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    candidates
-        .map(|candidate| (strsim::jaro_winkler(name, last(candidate)), candidate))
-        .filter(|(likeness, _)| *likeness > 0.8)
-        .max_by(|left, right| left.0.total_cmp(&right.0))
-        .map(|(_, candidate)| candidate)
+/// As [`lobelia_base::nearest`], over the last parts of paths.
+fn nearest<'a>(name: &str, candidates: impl Iterator<Item = &'a str> + Clone) -> Option<&'a str> {
+    let near = lobelia_base::nearest(name, candidates.clone().map(last))?;
+    candidates.into_iter().find(|candidate| last(candidate) == near)
 }
 
 /// The name in naga's "no definition in scope for identifier: `NAME`".

@@ -7,9 +7,9 @@ use crate::{
     error::BuildError,
     gpu::Gpu,
     pipeline::{ComputePipeline, DeclaredBinding, RasterPipeline, Reflection, checked},
-    registry::nearest,
     resource::{Access, BufferPart, TexturePart},
 };
+use lobelia_base::nearest;
 use std::sync::Arc;
 
 enum Value<'a> {

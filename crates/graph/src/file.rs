@@ -307,7 +307,7 @@ impl GraphFile {
                     }
                 }
                 other => {
-                    let near = crate::registry::nearest(other, ["passes", "output", "variants"]);
+                    let near = lobelia_base::nearest(other, ["passes", "output", "variants"]);
                     reader.problems.push(
                         Problem::at(
                             name.span.clone(),

@@ -8,6 +8,7 @@ use crate::{
     ports::{AnyShape, PortInfo, PortValue, Ports},
     run::Frame,
 };
+use lobelia_base::nearest;
 use lobelia_shaders::Flags;
 use std::{any::Any, fmt::Debug, marker::PhantomData, sync::Arc};
 
@@ -92,16 +93,6 @@ impl<W: World> Registry<W> {
 /// RON identifiers cannot hold `-`, so files write `vpl_lights` for `vpl-lights`.
 pub(crate) fn canonical(name: &str) -> String {
     name.replace('_', "-")
-}
-
-/// The candidate that a reader most likely meant.
-pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    candidates
-        .into_iter()
-        .map(|candidate| (strsim::jaro_winkler(name, candidate), candidate))
-        .filter(|(score, _)| *score > 0.75)
-        .max_by(|left, right| left.0.total_cmp(&right.0))
-        .map(|(_, candidate)| candidate)
 }
 
 /// Parameters whose type has been forgotten.

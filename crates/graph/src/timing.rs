@@ -138,7 +138,6 @@ pub fn write_chrome_trace(path: &Path, frames: &[FrameReport]) -> std::io::Resul
         offset += end;
     }
     let text = serde_json::to_vec(&serde_json::json!({"displayTimeUnit": "ms", "traceEvents": events}))?;
-    let temporary = path.with_extension("json.tmp");
-    std::fs::write(&temporary, text)?;
-    std::fs::rename(&temporary, path)
+    lobelia_base::replace_file(path, |file| std::io::Write::write_all(file, &text).map_err(|error| error.to_string()))
+        .map_err(std::io::Error::other)
 }

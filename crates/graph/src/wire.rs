@@ -6,8 +6,9 @@ use crate::{
     pass::World,
     ports::{Arity, PortInfo},
     problem::{Problem, Problems},
-    registry::{AnyParams, Kind, Registry, nearest},
+    registry::{AnyParams, Kind, Registry},
 };
+use lobelia_base::nearest;
 use petgraph::{algo::tarjan_scc, graph::DiGraph};
 use std::{ops::Range, sync::Arc};
 

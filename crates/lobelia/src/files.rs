@@ -1,32 +1,15 @@
-//! Files that the program writes. Each goes to a temporary file beside its goal and is renamed, so that nothing is ever half-written.
+//! Files that the program writes, whole or not at all.
 
 use crate::failure::Failure;
 use lobelia::{
     graph::{Part, PartData, PartKind},
     measure::Image,
 };
-use std::{
-    io::Write,
-    path::{Path, PathBuf},
-};
+use std::path::Path;
 
-/// Writes `path` through a temporary file in the same folder.
+/// Writes `path` whole or not at all, see [`lobelia_base::replace_file`].
 pub fn atomically(path: &Path, write: impl FnOnce(&mut std::fs::File) -> Result<(), String>) -> Result<(), Failure> {
-    let fail = |what: String| Failure::Run(format!("{}: {what}", path.display()));
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".lobelia-").suffix(".tmp");
-    // Temporary files are private; what comes of this one is a picture like any other, so the umask decides.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder).map_err(|error| fail(format!("cannot write there: {error}")))?;
-    write(file.as_file_mut()).map_err(fail)?;
-    file.as_file_mut().flush().map_err(|error| fail(error.to_string()))?;
-    file.persist(path).map_err(|error| fail(error.to_string()))?;
-    Ok(())
+    lobelia_base::replace_file(path, write).map_err(|error| Failure::Run(format!("{}: {error}", path.display())))
 }
 
 /// What a file name's ending asks for.
@@ -55,17 +38,9 @@ pub fn kind_of(path: &Path, allowed: &[Kind]) -> Result<Kind, Failure> {
     })
 }
 
-/// Refuses a goal whose folder does not exist before any work is done.
-pub fn check_folder(path: &Path) -> Result<(), Failure> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).map_or_else(|| PathBuf::from("."), Path::to_path_buf);
-    if path.is_dir() {
-        return Err(Failure::Input(format!("{}: this is a folder; name a file", path.display())));
-    }
-    if folder.is_dir() {
-        Ok(())
-    } else {
-        Err(Failure::Input(format!("{}: the folder {} does not exist", path.display(), folder.display())))
-    }
+/// Refuses a goal that could not be written before any work is done: a folder, a read-only file, a place in a folder that is not there.
+pub fn check_goal(path: &Path) -> Result<(), Failure> {
+    lobelia_base::check_goal(path).map_err(|error| Failure::Input(format!("{}: {error}", path.display())))
 }
 
 /// Writes an 8-bit RGBA picture.

@@ -1,8 +1,10 @@
 //! The `lobelia` program.
 
 mod commands;
+mod console;
 mod failure;
 mod files;
+mod progress;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -52,6 +54,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
+    console::silence_device_selection();
     let filter = tracing_subscriber::EnvFilter::try_from_env("LOBELIA_LOG").unwrap_or_else(|_| "error,naga_oil=off".into());
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
     // A reader that goes away (`lobelia passes | head`) is no reason to panic.

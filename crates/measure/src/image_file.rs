@@ -92,25 +92,17 @@ pub fn write_png(path: &Path, width: u32, height: u32, rgba: &[u8]) -> Result<()
 }
 
 /// Gives a file new contents through a temporary file in the same folder, renamed when all is written: readers see the old file or the new one, and
-/// a failure leaves the old one untouched and nothing beside it.
+/// a failure leaves the old one untouched and nothing beside it. Links and rights are respected as [`lobelia_base::replace_file`] says.
 pub fn replace_file<F>(path: &Path, write: F) -> Result<(), MeasureError>
 where
     F: FnOnce(&mut (dyn WriteSeek + '_)) -> Result<(), String>,
 {
-    // The parent of a bare file name is the empty path.
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let cannot = |error: String| failure(path, format!("cannot be written: {error}"));
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".lobelia-").suffix(".tmp");
-    #[cfg(unix)]
-    // As for any new file, the user's mask takes rights away; a temporary file would be for its owner alone.
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let temporary = builder.tempfile_in(folder).map_err(|error| cannot(error.to_string()))?;
-    let mut buffered = BufWriter::new(temporary);
-    write(&mut buffered).map_err(cannot)?;
-    let temporary = buffered.into_inner().map_err(|error| cannot(error.to_string()))?;
-    temporary.persist(path).map_err(|error| cannot(error.to_string()))?;
-    Ok(())
+    lobelia_base::replace_file(path, |file| {
+        let mut buffered = BufWriter::new(file);
+        write(&mut buffered)?;
+        buffered.flush().map_err(|error| error.to_string())
+    })
+    .map_err(|error| failure(path, format!("cannot be written: {error}")))
 }
 
 /// A place that bytes can be written to in any order.

@@ -116,18 +116,14 @@ impl Checkpoint {
 
     /// Writes it beside its final place and moves it there, so that a file is whole or absent.
     pub fn save(&self, file: &Path) -> Result<(), ReferenceError> {
-        let fail = |source| ReferenceError::File { file: file.into(), source };
-        let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let mut out = tempfile::NamedTempFile::new_in(folder).map_err(fail)?;
         let mut bytes = Vec::with_capacity(64 + 48 * self.sums.len());
         bytes.extend(MAGIC);
         bytes.extend(self.key);
         bytes.extend(self.passes.to_le_bytes());
         bytes.extend(self.dropped.to_le_bytes());
         bytes.extend(self.sums.as_flattened().iter().flat_map(|sum| sum.to_le_bytes()));
-        out.write_all(&bytes).map_err(fail)?;
-        out.persist(file).map_err(|error| fail(error.error))?;
-        Ok(())
+        lobelia_base::replace_file(file, |out| out.write_all(&bytes).map_err(|error| error.to_string()))
+            .map_err(|error| ReferenceError::File { file: file.into(), source: std::io::Error::other(error.to_string()) })
     }
 }
 

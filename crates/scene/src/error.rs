@@ -67,9 +67,8 @@ impl SceneError {
 
 /// `did you mean ...`, or all names.
 pub(crate) fn suggestion(name: &str, known: &[&str]) -> String {
-    let near = known.iter().map(|known| (strsim::jaro_winkler(name, known), known)).filter(|(score, _)| *score > 0.75);
-    match near.max_by(|left, right| left.0.total_cmp(&right.0)) {
-        Some((_, near)) => format!("did you mean `{near}`?"),
+    match lobelia_base::nearest(name, known.iter().copied()) {
+        Some(near) => format!("did you mean `{near}`?"),
         None if known.is_empty() => "there are none".into(),
         None => format!("there are {}", known.join(", ")),
     }

@@ -4,8 +4,8 @@ use super::{
     sequence,
     sequence::{Expected, FlickerAgainst, OWN_SAMPLES, SequenceArguments},
 };
-use crate::{failure::Failure, files};
-use indicatif::{ProgressBar, ProgressStyle};
+use crate::{failure::Failure, files, progress};
+use indicatif::ProgressBar;
 use lobelia::{
     Session, Shot,
     frame::LightTransport,
@@ -323,11 +323,7 @@ const REFERENCE_SEED: u32 = 1;
 
 /// A bar for a trial.
 pub fn trial_bar(quiet: bool) -> ProgressBar {
-    let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(1) };
-    if let Ok(style) = ProgressStyle::with_template("{bar:32} {percent:>3} %  {elapsed_precise} (left {eta})  {msg}") {
-        bar.set_style(style);
-    }
-    bar
+    progress::bar(quiet, 1)
 }
 
 /// Shows how far a trial is.

@@ -2,8 +2,9 @@ use super::{SceneArguments, parse_size};
 use crate::{
     failure::Failure,
     files::{self, Kind},
+    progress,
 };
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use lobelia::{
     Session,
     light::Lights,
@@ -121,7 +122,7 @@ impl From<ReferenceError> for Failure {
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     files::kind_of(&arguments.output, &[Kind::Exr])?;
-    files::check_folder(&arguments.output)?;
+    files::check_goal(&arguments.output)?;
     let scene = Session::load(&arguments.scene.scene, &arguments.scene.options())?;
     if !arguments.quiet {
         for warning in &scene.warnings {
@@ -173,13 +174,9 @@ fn resume(render: &mut Render, checkpoint: &Path, quiet: bool) -> Result<(), Fai
     Ok(())
 }
 
-/// A bar for a growing reference, on standard error if that is a terminal.
+/// A bar for a growing reference.
 pub fn growth_bar(quiet: bool, passes: u64) -> ProgressBar {
-    let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(passes) };
-    if let Ok(style) = ProgressStyle::with_template("{bar:32} {percent:>3} %  {elapsed_precise} (left {eta})  {msg}") {
-        bar.set_style(style);
-    }
-    bar
+    progress::bar(quiet, passes)
 }
 
 /// Shows how far a reference is.

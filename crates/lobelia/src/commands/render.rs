@@ -2,9 +2,10 @@ use super::{GraphArguments, SceneArguments, parse_save, parse_size};
 use crate::{
     failure::Failure,
     files::{self, Kind},
+    progress,
 };
 use comfy_table::{CellAlignment, Table, presets};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use lobelia::{
     Rendering, Session, Shot, Step,
     explain::mebibytes,
@@ -137,6 +138,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     for (port, path) in &arguments.saves {
         save(&rendering, port, path)?;
     }
+    hint_at_exposure(arguments, rendering.plan(), &picture);
     if let Some(path) = &arguments.profile {
         write_profile(path, rendering.reports())?;
     }
@@ -176,7 +178,7 @@ fn check_goals(arguments: &Arguments) -> Result<(), Failure> {
     let saves = arguments.saves.iter().map(|(_, path)| path);
     let mut goals = std::collections::BTreeSet::new();
     for path in arguments.output.iter().chain(saves).chain(&arguments.profile) {
-        files::check_folder(path)?;
+        files::check_goal(path)?;
         if !goals.insert(path) {
             return Err(Failure::Input(format!("{}: two results cannot be written to one file", path.display())));
         }
@@ -225,17 +227,21 @@ fn warn_uncast(arguments: &Arguments, plan: &Plan<SceneWorld>, traits: &lobelia:
     }
 }
 
+/// A picture that is mostly white or black says nothing; the number that would help is known.
+fn hint_at_exposure(arguments: &Arguments, plan: &Plan<SceneWorld>, picture: &lobelia::Picture) {
+    let Some(display) = picture.display.as_ref().filter(|_| !arguments.quiet && arguments.output.is_some()) else { return };
+    let Some(hint) = lobelia::exposure::hint(display, &picture.image()) else { return };
+    let pass = &plan.passes[plan.resources[plan.output].maker];
+    let colour = if hint.white { "white" } else { "black" };
+    let set = match pass.params_json().get("exposure") {
+        Some(_) => format!("--set {}.exposure={}", pass.name, hint.stops),
+        None => format!("an exposure of {} stops", hint.stops),
+    };
+    eprintln!("hint: {:.0} % of the picture is {colour}; {set} would bring it to middle grey", 100.0 * hint.share);
+}
+
 fn progress_bar(arguments: &Arguments, shot: &Shot) -> ProgressBar {
-    if arguments.quiet || arguments.json {
-        return ProgressBar::hidden();
-    }
-    // Drawn to standard error, and only if that is a terminal.
-    let bar = ProgressBar::new(u64::from(shot.frames) * u64::from(shot.samples) * 1000);
-    let style = ProgressStyle::with_template("{bar:32} {percent:>3} %  {elapsed_precise} (left {eta})  {msg}");
-    if let Ok(style) = style {
-        bar.set_style(style);
-    }
-    bar
+    progress::bar(arguments.quiet || arguments.json, u64::from(shot.frames) * u64::from(shot.samples) * 1000)
 }
 
 fn show_step(bar: &ProgressBar, shot: &Shot, step: &Step) -> bool {
