@@ -51,7 +51,7 @@ fn texture(width: u32, rgba: &[[u8; 4]]) -> Texture {
 }
 
 fn nearest(texture: usize) -> Option<TextureRef> {
-    Some(TextureRef { texture, sampler: Sampler { nearest: true, ..Sampler::default() } })
+    Some(TextureRef { texture, sampler: Sampler { nearest: true, ..Sampler::default() }, ..TextureRef::default() })
 }
 
 fn plan(scene: &Scene, text: &str) -> Result<Plan<SceneWorld>, String> {

@@ -38,11 +38,11 @@ fn check_glb_length(bytes: &[u8]) -> Result<(), String> {
 
 fn check_required_extensions(root: &Root) -> Result<(), String> {
     let unknown: Vec<&str> =
-        root.extensions_required.iter().map(String::as_str).filter(|name| !super::KNOWN_EXTENSIONS.contains(name)).collect();
+        root.extensions_required.iter().map(String::as_str).filter(|name| !super::extensions::is_known(name)).collect();
     if unknown.is_empty() {
         return Ok(());
     }
-    let known = super::KNOWN_EXTENSIONS.join(" and ");
+    let known = super::extensions::known().join(", ");
     Err(format!("it requires {}, which this program cannot read; of extensions it reads {known}", unknown.join(", ")))
 }
 
