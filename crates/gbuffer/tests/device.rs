@@ -29,6 +29,7 @@ fn square(material: usize) -> Mesh {
         uvs: corners.map(|corner| Vec2::new(0.5 + 0.5 * corner.x, 0.5 - 0.5 * corner.y)).to_vec(),
         indices: vec![0, 1, 2, 0, 2, 3],
         material,
+        ..Mesh::default()
     }
 }
 

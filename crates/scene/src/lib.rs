@@ -271,6 +271,15 @@ impl Scene {
         (!placed.is_empty(), failed)
     }
 
+    /// The meshes that joints or morph targets moved since `before`, the same scene at another time.
+    pub(crate) fn moved_meshes(&self, before: &Scene) -> Vec<usize> {
+        if Arc::ptr_eq(&self.meshes, &before.meshes) {
+            return Vec::new();
+        }
+        let poses = self.poses.poses.iter().map(|pose| pose.mesh);
+        poses.filter(|mesh| self.meshes.get(*mesh) != before.meshes.get(*mesh)).collect()
+    }
+
     /// Takes all lights away, area lights with their surfaces. Emissive materials and the environment stay.
     pub(crate) fn drop_lights(&mut self) {
         self.lights.clear();
