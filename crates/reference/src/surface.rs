@@ -106,9 +106,8 @@ impl Surfaces {
 
     fn texel(&self, texture: Option<TextureRef>, at: &Interpolated, srgb: bool) -> DVec4 {
         let [first, second] = at.uvs;
-        texture.map_or(DVec4::ONE, |reference| {
-            self.textures[reference.texture].sample(reference.sampler, reference.uv(first, second), srgb)
-        })
+        texture
+            .map_or(DVec4::ONE, |reference| self.textures[reference.texture].sample(reference.sampler, reference.uv(first, second), srgb))
     }
 
     /// Colour and alpha of a material's texture and the mesh's vertices.
@@ -210,10 +209,7 @@ fn interpolated(mesh: &Mesh, vertices: [u32; 3], weights: [f64; 3]) -> Interpola
     let corners = || vertices.iter().map(|vertex| *vertex as usize).zip(weights);
     let uv = |set: &[Vec2]| corners().map(|(vertex, weight)| set.get(vertex).copied().unwrap_or(Vec2::ZERO).as_dvec2() * weight).sum();
     let second = if mesh.second_uvs.is_empty() { DVec2::ZERO } else { uv(&mesh.second_uvs) };
-    let color = if mesh.colors.is_empty() {
-        DVec4::ONE
-    } else {
-        corners().map(|(vertex, weight)| mesh.colors[vertex].as_dvec4() * weight).sum()
-    };
+    let color =
+        if mesh.colors.is_empty() { DVec4::ONE } else { corners().map(|(vertex, weight)| mesh.colors[vertex].as_dvec4() * weight).sum() };
     Interpolated { uvs: [uv(&mesh.uvs), second], color }
 }

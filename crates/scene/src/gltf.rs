@@ -197,7 +197,14 @@ impl Loader<'_> {
     }
 
     /// Places a node's mesh, for its skin, its weights and its instances.
-    fn mesh(&mut self, gltf: &gltf::Gltf, at_node: &gltf::Node<'_>, mesh: &gltf::Mesh<'_>, node: usize, name: &str) -> Result<(), SceneError> {
+    fn mesh(
+        &mut self,
+        gltf: &gltf::Gltf,
+        at_node: &gltf::Node<'_>,
+        mesh: &gltf::Mesh<'_>,
+        node: usize,
+        name: &str,
+    ) -> Result<(), SceneError> {
         let places = self.instances(gltf, at_node)?;
         let skin = at_node.skin().map(|skin| skin.index());
         let weights = at_node.weights().or_else(|| mesh.weights()).unwrap_or_default();

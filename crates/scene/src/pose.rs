@@ -91,8 +91,8 @@ impl Poses {
                 continue;
             }
             let (mesh, world_from_local) = rest.posed(weights, &joints);
-            let in_range = mesh.positions.iter().all(|position| position.is_finite())
-                && world_from_local.is_none_or(|matrix| matrix.is_finite());
+            let in_range =
+                mesh.positions.iter().all(|position| position.is_finite()) && world_from_local.is_none_or(|matrix| matrix.is_finite());
             if in_range {
                 pose.has = Some((weights.to_vec(), joints));
                 made.push(Ok(Posed { index: pose.mesh, mesh, world_from_local }));
@@ -157,7 +157,8 @@ impl Rest {
             return mesh;
         }
         let moved = |from: Vec3, index: usize, deltas: fn(&Target) -> &[Vec3]| {
-            let delta = |(target, weight): &(&Target, f64)| deltas(target).get(index).map_or(DVec3::ZERO, |delta| delta.as_dvec3() * *weight);
+            let delta =
+                |(target, weight): &(&Target, f64)| deltas(target).get(index).map_or(DVec3::ZERO, |delta| delta.as_dvec3() * *weight);
             from.as_dvec3() + active.iter().map(delta).sum::<DVec3>()
         };
         for index in 0..mesh.positions.len() {

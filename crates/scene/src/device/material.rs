@@ -19,11 +19,8 @@ pub(super) fn material_layout(device: &wgpu::Device, transforms: bool) -> wgpu::
         view_dimension: wgpu::TextureViewDimension::D2,
         multisampled: false,
     };
-    let uniform = |size| wgpu::BindingType::Buffer {
-        ty: wgpu::BufferBindingType::Uniform,
-        has_dynamic_offset: false,
-        min_binding_size: Some(size),
-    };
+    let uniform =
+        |size| wgpu::BindingType::Buffer { ty: wgpu::BufferBindingType::Uniform, has_dynamic_offset: false, min_binding_size: Some(size) };
     let mut entries = vec![entry(0, uniform(MaterialUniform::min_size()))];
     entries.extend((1..5).map(|binding| entry(binding, texture)));
     entries.extend((5..9).map(|binding| entry(binding, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering))));

@@ -49,9 +49,7 @@ pub(super) fn lost_of_file(name: &str) -> Option<&'static str> {
 }
 
 /// The extensions of a material that are not drawn, each with what is lost. One whose numbers are all 0 changes nothing and is not listed.
-pub(super) fn lost_of_material<'a>(
-    extension: impl Fn(&str) -> Option<&'a Value>,
-) -> impl Iterator<Item = (&'static str, &'static str)> {
+pub(super) fn lost_of_material<'a>(extension: impl Fn(&str) -> Option<&'a Value>) -> impl Iterator<Item = (&'static str, &'static str)> {
     BASE_MATERIAL.into_iter().filter(move |(name, _)| extension(name).and_then(Value::as_object).is_some_and(has_effect))
 }
 
@@ -62,8 +60,7 @@ fn has_effect(extension: &serde_json::Map<String, Value>) -> bool {
         _ => false,
     };
     // The strength of each of these extensions is a factor or strength that is 0 unless it is given.
-    let strength = |key: &str| {
-        ["Factor", "Strength", "dispersion"].iter().any(|ending| key.ends_with(ending)) && !key.ends_with("RoughnessFactor")
-    };
+    let strength =
+        |key: &str| ["Factor", "Strength", "dispersion"].iter().any(|ending| key.ends_with(ending)) && !key.ends_with("RoughnessFactor");
     extension.iter().any(|(key, value)| strength(key) && nonzero(value))
 }

@@ -72,9 +72,9 @@ fn texture_transform(extension: &Value) -> Result<(Affine2, Option<u32>), String
     let rotation = extension.get("rotation").map_or(Some(0.0), number).ok_or("KHR_texture_transform: `rotation` is not a finite number")?;
     let set = match extension.get("texCoord") {
         None => None,
-        Some(value) => Some(
-            value.as_u64().and_then(|set| u32::try_from(set).ok()).ok_or("KHR_texture_transform: `texCoord` is not a whole number")?,
-        ),
+        Some(value) => {
+            Some(value.as_u64().and_then(|set| u32::try_from(set).ok()).ok_or("KHR_texture_transform: `texCoord` is not a whole number")?)
+        }
     };
     let transform = Affine2::from_scale_angle_translation(pair("scale", Vec2::ONE)?, -rotation, pair("offset", Vec2::ZERO)?);
     Ok((transform, set))
@@ -111,9 +111,7 @@ impl Loader<'_> {
         let opacity = self.reflectance(material, &mut read)?;
         read.alpha_mode = match material.alpha_mode() {
             gltf::material::AlphaMode::Opaque => AlphaMode::Opaque,
-            gltf::material::AlphaMode::Mask => {
-                AlphaMode::Mask { cutoff: texture_cutoff(material.alpha_cutoff().unwrap_or(0.5), opacity) }
-            }
+            gltf::material::AlphaMode::Mask => AlphaMode::Mask { cutoff: texture_cutoff(material.alpha_cutoff().unwrap_or(0.5), opacity) },
             gltf::material::AlphaMode::Blend => {
                 self.warn("blended materials are drawn opaque");
                 AlphaMode::Opaque
@@ -199,11 +197,7 @@ impl Loader<'_> {
 
     /// `KHR_materials_pbrSpecularGlossiness`; returns the alpha of the diffuse colour. Its textures stand where those of the base colour and of metallic and
     /// roughness do.
-    fn specular_glossiness(
-        &mut self,
-        glossy: &gltf::material::PbrSpecularGlossiness<'_>,
-        read: &mut Material,
-    ) -> Result<f32, SceneError> {
+    fn specular_glossiness(&mut self, glossy: &gltf::material::PbrSpecularGlossiness<'_>, read: &mut Material) -> Result<f32, SceneError> {
         let [red, green, blue, opacity] = glossy.diffuse_factor();
         let (diffuse, specular) = (Vec3::new(red, green, blue), Vec3::from_array(glossy.specular_factor()));
         let gloss = glossy.glossiness_factor();

@@ -21,7 +21,10 @@ pub(crate) fn open(bytes: &[u8], shown: &str) -> Result<gltf::Gltf, SceneError> 
         gltf::Gltf::from_slice_without_validation(bytes).map_err(|error| fail(format!("not a valid glTF 2.0 file: {error}")))?;
     check_required_extensions(unchecked.document.as_json()).map_err(fail)?;
     check_what_validation_trusts(unchecked.document.as_json()).map_err(fail)?;
-    let document = gltf::Document::from_json(unchecked.document.into_json()).map_err(|error| fail(explain(&error)))?;
+    let mut root = unchecked.document.into_json();
+    // What is required has been looked at; the validation knows fewer extensions.
+    root.extensions_required.clear();
+    let document = gltf::Document::from_json(root).map_err(|error| fail(explain(&error)))?;
     Ok(gltf::Gltf { document, blob: unchecked.blob })
 }
 

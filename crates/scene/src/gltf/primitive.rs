@@ -112,7 +112,9 @@ impl Source<'_> {
             let row = 4 * vertex..4 * vertex + 4;
             let mut pairs: Vec<(f32, f64)> = sets
                 .iter()
-                .flat_map(|(joints, weights)| joints[row.clone()].iter().copied().zip(weights[row.clone()].iter().map(|w| f64::from(*w).max(0.0))))
+                .flat_map(|(joints, weights)| {
+                    joints[row.clone()].iter().copied().zip(weights[row.clone()].iter().map(|w| f64::from(*w).max(0.0)))
+                })
                 .collect();
             let total: f64 = pairs.iter().map(|(_, weight)| weight).sum();
             if total > 0.0 {

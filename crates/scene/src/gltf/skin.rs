@@ -63,8 +63,7 @@ impl Loader<'_> {
             return Err(self.fail(format!("{at}: a weight of its morph targets is {weight}")));
         }
         let animated = targets > 0 && self.scene.nodes.weight_channels.iter().any(|channel| channel.node == node);
-        let weights: Vec<f64> =
-            (0..targets).map(|target| written_weights.get(target).map_or(0.0, |weight| f64::from(*weight))).collect();
+        let weights: Vec<f64> = (0..targets).map(|target| written_weights.get(target).map_or(0.0, |weight| f64::from(*weight))).collect();
         let key = (rest, skin, animated.then_some(node), weights.iter().map(|weight| weight.to_bits()).collect());
         if let Some(known) = self.posed.get(&key) {
             return Ok(*known);

@@ -57,12 +57,14 @@ pub(super) fn converted(factors: Factors, diffuse: Option<&Texture>, glossy: &Te
         if other.width * other.height > glossy.width * glossy.height { (other.width, other.height) } else { (glossy.width, glossy.height) }
     });
     let at = |texture: &Texture, x: u32, y: u32| -> [u8; 4] {
-        let (x, y) = (u64::from(x) * u64::from(texture.width) / u64::from(width), u64::from(y) * u64::from(texture.height) / u64::from(height));
+        let (x, y) =
+            (u64::from(x) * u64::from(texture.width) / u64::from(width), u64::from(y) * u64::from(texture.height) / u64::from(height));
         let start = 4 * (y * u64::from(texture.width) + x) as usize;
         [0, 1, 2, 3].map(|channel| texture.rgba[start + channel])
     };
     let color = |[r, g, b, _]: [u8; 4]| Vec3::new(decoded(r), decoded(g), decoded(b));
-    let empty = |what: &str| Texture { name: format!("{name} ({what})"), width, height, rgba: Vec::with_capacity(4 * (width * height) as usize) };
+    let empty =
+        |what: &str| Texture { name: format!("{name} ({what})"), width, height, rgba: Vec::with_capacity(4 * (width * height) as usize) };
     let (mut base, mut rough) = (empty("base colour"), empty("metallic and roughness"));
     for y in 0..height {
         for x in 0..width {

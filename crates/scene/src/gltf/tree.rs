@@ -174,12 +174,7 @@ impl Loader<'_> {
     }
 
     /// Key times and interpolation of a sampler with `numbers` for its values.
-    fn keys(
-        &self,
-        sampler: &gltf::animation::Sampler<'_>,
-        numbers: &[f32],
-        at: &str,
-    ) -> Result<(Vec<f32>, Interpolation), SceneError> {
+    fn keys(&self, sampler: &gltf::animation::Sampler<'_>, numbers: &[f32], at: &str) -> Result<(Vec<f32>, Interpolation), SceneError> {
         let times = self.buffers.floats(self.shown, &sampler.input(), 1)?;
         let interpolation = match sampler.interpolation() {
             gltf::animation::Interpolation::Step => Interpolation::Step,

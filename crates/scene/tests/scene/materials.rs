@@ -132,8 +132,7 @@ fn quantised_attributes_are_read_whether_required_or_not() {
         let mut accessor = |bytes: &[u8], stride: usize, kind: u32, normalized: bool, shape: &str, range: Option<Value>| {
             let view = glb.view(bytes);
             glb.json["bufferViews"][view]["byteStride"] = json!(stride);
-            let mut accessor =
-                json!({"bufferView": view, "componentType": kind, "normalized": normalized, "count": 3, "type": shape});
+            let mut accessor = json!({"bufferView": view, "componentType": kind, "normalized": normalized, "count": 3, "type": shape});
             if let Some(range) = range {
                 (accessor["min"], accessor["max"]) = (range[0].clone(), range[1].clone());
             }

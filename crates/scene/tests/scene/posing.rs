@@ -297,7 +297,11 @@ fn flat_normals_and_made_tangents_follow_the_pose() {
     let scene = glb.load().unwrap();
     // The corner (1, 0) is at (0, 1) now: u runs along +Y.
     assert_eq!(scene.meshes[0].positions.len(), 6);
-    assert!(scene.meshes[0].tangents.iter().all(|t| (*t - Vec4::new(0.0, 1.0, 0.0, 1.0)).length() < 1e-5), "{:?}", scene.meshes[0].tangents);
+    assert!(
+        scene.meshes[0].tangents.iter().all(|t| (*t - Vec4::new(0.0, 1.0, 0.0, 1.0)).length() < 1e-5),
+        "{:?}",
+        scene.meshes[0].tangents
+    );
 }
 
 #[test]
