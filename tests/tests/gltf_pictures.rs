@@ -100,8 +100,7 @@ fn cards() -> Vec<u8> {
     ];
     (materials[0]["alphaMode"], materials[0]["alphaCutoff"]) = (json!("MASK"), json!(0.3));
     materials[3]["extensions"] = json!({"KHR_materials_unlit": {}});
-    materials[4]["extensions"] =
-        json!({"KHR_materials_ior": {"ior": 2.4}, "KHR_materials_specular": {"specularFactor": 0.9, "specularColorFactor": [1.0, 0.6, 0.2]}});
+    materials[4]["extensions"] = json!({"KHR_materials_ior": {"ior": 2.4}, "KHR_materials_specular": {"specularFactor": 0.9, "specularColorFactor": [1.0, 0.6, 0.2]}});
     glb.json["materials"] = json!(materials);
     let mut nodes = Vec::new();
     for card in 0..8usize {
