@@ -272,7 +272,7 @@ fn missing_tangents_follow_the_texture() {
 fn without_texture_coordinates_there_is_no_normal_map() {
     let (none, warnings) = tangents(None);
     assert!(none.iter().all(|tangent| *tangent == Vec4::ZERO));
-    assert!(warnings[0].contains("its normal map is ignored"), "{warnings:?}");
+    assert!(warnings.iter().any(|warning| warning.contains("its normal map is ignored")), "{warnings:?}");
     let (collapsed, _) = tangents(Some(&[0.5; 8]));
     assert!(collapsed.iter().all(|tangent| tangent.is_finite()), "{collapsed:?}");
 }
