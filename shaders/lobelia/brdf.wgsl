@@ -5,7 +5,8 @@
 // n: shading normal, l: to the light, v: to the viewer, h: half vector. The twin in `f64`, and what is known of the energy that each lobe reflects:
 // `crates/lobes/src/brdf.rs`.
 //
-// Flags: SPECULAR (off: Lambert only), NDF_PHONG (off: GGX), NORMAL_MAP (off: the geometric normal is the shading normal).
+// Flags: SPECULAR (off: Lambert only), DIELECTRIC (off: dielectrics have an index of refraction of 1.5), NDF_PHONG (off: GGX), NORMAL_MAP (off: the
+// geometric normal is the shading normal).
 #define_import_path lobelia::brdf
 
 #import lobelia::math::{INV_PI, PI, fifth_power, log_one_plus, safe_normalize}
@@ -26,8 +27,13 @@ fn brdf_from_surface(surface: Surface) -> Brdf {
     var brdf: Brdf;
     brdf.diffuse = surface.base_color * ((1.0 - surface.metallic) * INV_PI);
 #ifdef SPECULAR
+#ifdef DIELECTRIC
+    brdf.reflectance_normal = surface.specular * mix(surface.dielectric.rgb, surface.base_color, surface.metallic);
+    brdf.reflectance_grazing = surface.specular * mix(surface.dielectric.w, 1.0, surface.metallic);
+#else
     brdf.reflectance_normal = surface.specular * mix(vec3f(0.04), surface.base_color, surface.metallic);
     brdf.reflectance_grazing = surface.specular;
+#endif
     brdf.alpha = max(surface.roughness * surface.roughness, MIN_ALPHA);
 #else
     brdf.reflectance_normal = vec3f(0.0);

@@ -8,6 +8,8 @@ const LIGHT_DIRECTIONAL: u32 = 2u;
 
 // Back faces emit as well.
 const MATERIAL_EMITS_BOTH_WAYS: u32 = 1u;
+// Drawn in its base colour; reflects nothing.
+const MATERIAL_UNLIT: u32 = 2u;
 
 struct View {
     clip_from_scene: mat4x4f,
@@ -63,8 +65,23 @@ struct Material {
     normal_scale: f32,
     // 0: opaque.
     alpha_cutoff: f32,
-    // MATERIAL_EMITS_BOTH_WAYS or 0.
+    // MATERIAL_EMITS_BOTH_WAYS, MATERIAL_UNLIT, both or 0.
     flags: u32,
+    // Reflectance of what is not metallic at normal incidence, xyz, and at grazing incidence, w.
+    dielectric: vec4f,
+}
+
+// Where one texture of a material is read: u' = dot(u_row.xyz, (u, v, 1)), v' likewise, for the mesh's second set of coordinates where u_row.w is 1.
+struct TextureTransform {
+    u_row: vec4f,
+    v_row: vec4f,
+}
+
+struct TextureTransforms {
+    base_color: TextureTransform,
+    metallic_roughness: TextureTransform,
+    normal: TextureTransform,
+    emissive: TextureTransform,
 }
 
 // Direction through the sample position of pixel (x, y), y down; not unit: its part along `view.forward` is 1.

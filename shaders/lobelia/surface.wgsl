@@ -1,6 +1,6 @@
 // A surface as light sees it, and how it is packed: the one place where texels of G-buffers and reflective shadow maps are coded and decoded.
 //
-// Flags: SPECULAR, NORMAL_MAP, EMISSIVE; without one, its part is not stored and decodes to the stated constant.
+// Flags: SPECULAR, NORMAL_MAP, EMISSIVE, and DIELECTRIC (only with SPECULAR); without one, its part is not stored and decodes to the stated constant.
 #define_import_path lobelia::surface
 
 #import lobelia::math::safe_normalize
@@ -18,6 +18,10 @@ struct Surface {
     roughness: f32,
     metallic: f32,
     specular: f32,
+#ifdef DIELECTRIC
+    // Reflectance of what is not metallic, at normal incidence and, w, at grazing incidence. Without DIELECTRIC 0.04 and 1.
+    dielectric: vec4f,
+#endif
     // Radiance; without EMISSIVE 0.
     emissive: vec3f,
 }
@@ -27,8 +31,20 @@ struct PackedSurface {
     core: vec2u,
     // Roughness 16 bits, metallic 8, specular scale 8.
     specular: u32,
+#ifdef DIELECTRIC
+    // Square roots of the reflectances, 8 bits each.
+    dielectric: u32,
+#endif
     geometric_normal: u32,
     emissive: u32,
+}
+
+// Takes a texel of the specular target: one word, or two with DIELECTRIC.
+fn load_specular(packed: ptr<function, PackedSurface>, texel: vec4u) {
+    (*packed).specular = texel.x;
+#ifdef DIELECTRIC
+    (*packed).dielectric = texel.y;
+#endif
 }
 
 // Roughness, metallic, specular scale, each in [0, 1].
@@ -42,6 +58,10 @@ fn pack_surface(surface: Surface) -> PackedSurface {
     var packed: PackedSurface;
     packed.core = vec2u(octahedral_pack(surface.normal), pack_color(surface.base_color));
     packed.specular = pack_specular(surface);
+#ifdef DIELECTRIC
+    // 0.04 is a whole number of steps: (51 / 255)^2.
+    packed.dielectric = pack4x8unorm(sqrt(clamp(surface.dielectric, vec4f(0.0), vec4f(1.0))));
+#endif
     packed.geometric_normal = octahedral_pack(surface.geometric_normal);
     packed.emissive = pack_shared_exponent(surface.emissive);
     return packed;
@@ -59,6 +79,10 @@ fn unpack_surface(packed: PackedSurface) -> Surface {
     surface.roughness = 1.0;
     surface.metallic = 0.0;
     surface.specular = 0.0;
+#endif
+#ifdef DIELECTRIC
+    let roots = unpack4x8unorm(packed.dielectric);
+    surface.dielectric = roots * roots;
 #endif
 #ifdef NORMAL_MAP
     surface.geometric_normal = octahedral_unpack(packed.geometric_normal);
@@ -125,6 +149,9 @@ fn material_surface(
     surface.roughness = clamp(material.roughness * texels.metallic_roughness.g, 0.0, 1.0);
     surface.metallic = clamp(material.metallic * texels.metallic_roughness.b, 0.0, 1.0);
     surface.specular = material.specular;
+#ifdef DIELECTRIC
+    surface.dielectric = material.dielectric;
+#endif
     let emits = front || (material.flags & MATERIAL_EMITS_BOTH_WAYS) != 0u;
     surface.emissive = select(vec3f(0.0), material.emissive * texels.emissive.rgb, emits);
     return surface;

@@ -19,6 +19,9 @@ struct VirtualLight {
     specular: u32,
     core: vec2u,
     source: u32,
+#ifdef DIELECTRIC
+    dielectric: u32,
+#endif
 }
 
 // The patch around a light, with its reflected light as lobes.
@@ -46,6 +49,9 @@ fn virtual_light_surface(light: VirtualLight) -> Surface {
     var packed: PackedSurface;
     packed.core = light.core;
     packed.specular = light.specular;
+#ifdef DIELECTRIC
+    packed.dielectric = light.dielectric;
+#endif
     packed.geometric_normal = light.geometric_normal;
     packed.emissive = 0u;
     return unpack_surface(packed);

@@ -3,9 +3,14 @@
 
 use lobelia_shaders::{Composer, Flags, ShaderError, Source, modules};
 
-const FLAGS: [&str; 19] = [
+const FLAGS: [&str; 24] = [
     "ANISOTROPIC",
     "SPECULAR",
+    "DIELECTRIC",
+    "UNLIT",
+    "SECOND_UV",
+    "VERTEX_COLOR",
+    "TEXTURE_TRANSFORM",
     "NORMAL_MAP",
     "EMISSIVE",
     "NDF_PHONG",

@@ -13,7 +13,7 @@
 #import lobelia::math::{safe_normalize, storable}
 #import lobelia::microfacet_lobe::beckmann_visibility
 #import lobelia::scene::{View, scene_position}
-#import lobelia::surface::{PackedSurface, Surface, unpack_surface}
+#import lobelia::surface::{PackedSurface, Surface, load_specular, unpack_surface}
 
 struct Settings {
     light_count: u32,
@@ -498,7 +498,7 @@ fn area_light(@builtin(global_invocation_id) id: vec3u) {
     var packed: PackedSurface;
     packed.core = textureLoad(gbuffer_core, id.xy, 0).xy;
 #ifdef SPECULAR
-    packed.specular = textureLoad(gbuffer_specular, id.xy, 0).x;
+    load_specular(&packed, textureLoad(gbuffer_specular, id.xy, 0));
 #endif
 #ifdef NORMAL_MAP
     packed.geometric_normal = textureLoad(gbuffer_geometric_normal, id.xy, 0).x;

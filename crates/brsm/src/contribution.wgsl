@@ -11,7 +11,7 @@
 #import lobelia::sg::sg_integral
 #import lobelia::sg_cosine::clamped_cosine_integral
 #import lobelia::sg_light::{cone_sharpness, scaled_light_product}
-#import lobelia::surface::{PackedSurface, Surface, unpack_surface}
+#import lobelia::surface::{PackedSurface, Surface, load_specular, unpack_surface}
 
 struct Settings {
     // Cells a side of each face: a power of two, at least 8.
@@ -102,7 +102,7 @@ fn texel_surface(texel: vec2u, face: RsmFace) -> Surface {
     var packed: PackedSurface;
     packed.core = textureLoad(rsm_core, place, face.layer, 0).xy;
 #ifdef SPECULAR
-    packed.specular = textureLoad(rsm_specular, place, face.layer, 0).x;
+    load_specular(&packed, textureLoad(rsm_specular, place, face.layer, 0));
 #endif
 #ifdef NORMAL_MAP
     packed.geometric_normal = textureLoad(rsm_geometric_normal, place, face.layer, 0).x;
@@ -175,7 +175,7 @@ fn load_view_sample(index: u32) -> ViewSample {
     var packed: PackedSurface;
     packed.core = textureLoad(gbuffer_core, pixel, 0).xy;
 #ifdef SPECULAR
-    packed.specular = textureLoad(gbuffer_specular, pixel, 0).x;
+    load_specular(&packed, textureLoad(gbuffer_specular, pixel, 0));
 #endif
 #ifdef NORMAL_MAP
     packed.geometric_normal = textureLoad(gbuffer_geometric_normal, pixel, 0).x;

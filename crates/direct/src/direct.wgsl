@@ -6,7 +6,7 @@
 #import lobelia::octahedral::octahedral_unpack
 #import lobelia::reflective_shadow_map::{RsmFace, rsm_cube_face, rsm_direction_to_light, rsm_distance, rsm_project, rsm_ray, rsm_ray_origin, rsm_texel}
 #import lobelia::scene::{PunctualLight, View, scene_position}
-#import lobelia::surface::{PackedSurface, unpack_surface}
+#import lobelia::surface::{PackedSurface, load_specular, unpack_surface}
 
 struct Settings {
     light_count: u32,
@@ -233,7 +233,7 @@ fn direct(@builtin(global_invocation_id) id: vec3u) {
     var packed: PackedSurface;
     packed.core = textureLoad(gbuffer_core, id.xy, 0).xy;
 #ifdef SPECULAR
-    packed.specular = textureLoad(gbuffer_specular, id.xy, 0).x;
+    load_specular(&packed, textureLoad(gbuffer_specular, id.xy, 0));
 #endif
 #ifdef NORMAL_MAP
     packed.geometric_normal = textureLoad(gbuffer_geometric_normal, id.xy, 0).x;

@@ -121,7 +121,7 @@ impl Pass for GivenPass {
             vertex_buffers: &[],
             targets: &[
                 target(true, SurfaceFormats::CORE),
-                target(flags.specular, SurfaceFormats::SPECULAR),
+                target(flags.specular, SurfaceFormats::specular(flags)),
                 target(flags.normal_map, SurfaceFormats::GEOMETRIC_NORMAL),
             ],
             depth: Some(wgpu::DepthStencilState {
@@ -174,7 +174,7 @@ impl Pass for GivenPass {
 }
 
 fn flags(params: &GivenParams) -> SurfaceFlags {
-    SurfaceFlags { specular: params.specular, normal_map: params.normal_map, emissive: false }
+    SurfaceFlags { specular: params.specular, normal_map: params.normal_map, emissive: false, dielectric: false }
 }
 
 /// Repeatable random numbers in [0, 1).

@@ -44,7 +44,7 @@ impl Pass for EmissionPass {
     type Bindings = Bindings;
 
     fn need(_: &NoParams, traits: &TraitsOf<Self>) -> Need {
-        if traits.emissive || traits.environment {
+        if traits.emissive || traits.unlit || traits.environment {
             Need::Run
         } else {
             Need::Omit("the scene has no emissive material and no environment map".into())

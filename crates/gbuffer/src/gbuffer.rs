@@ -5,7 +5,6 @@ use lobelia_graph::{
     BuildError, CreateContext, DeviceOf, Frame, InputShapes, NoParams, NoPorts, OutputShapes, Pass, PlanContext, PortError, Ports,
     RasterDescription, RasterPipeline, RunError, Specialisation,
 };
-use lobelia_scene::device::GpuScene;
 use lobelia_shaders::Source;
 
 /// Draws the scene from the camera.
@@ -40,12 +39,7 @@ impl Pass for GBufferPass {
 
     fn specialise(context: &PlanContext<'_, Self>, _: &InputShapes<Self>) -> Vec<Specialisation> {
         let mut flags = SurfaceFlags::of(context.traits).specialisations();
-        let mask = context.traits.alpha_mask;
-        flags.push(Specialisation::new(
-            "ALPHA_MASK",
-            mask,
-            if mask { "a material is cut out by alpha" } else { "no material is cut out by alpha" },
-        ));
+        flags.extend(SurfaceFlags::drawing(context.traits));
         flags
     }
 
@@ -62,10 +56,10 @@ impl Pass for GBufferPass {
             vertex_entry: "vertex",
             fragment_entry: Some("fragment"),
             flags: context.flags,
-            vertex_buffers: &[GpuScene::vertex_layout()],
+            vertex_buffers: &context.world.vertex_layouts(),
             targets: &[
                 target(true, SurfaceFormats::CORE),
-                target(flags.specular, SurfaceFormats::SPECULAR),
+                target(flags.specular, SurfaceFormats::specular(flags)),
                 target(flags.normal_map, SurfaceFormats::GEOMETRIC_NORMAL),
                 target(flags.emissive, SurfaceFormats::EMISSIVE),
             ],

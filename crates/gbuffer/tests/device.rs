@@ -29,6 +29,7 @@ fn square(material: usize) -> Mesh {
         uvs: corners.map(|corner| Vec2::new(0.5 + 0.5 * corner.x, 0.5 - 0.5 * corner.y)).to_vec(),
         indices: vec![0, 1, 2, 0, 2, 3],
         material,
+        ..Mesh::default()
     }
 }
 
@@ -51,7 +52,7 @@ fn texture(width: u32, rgba: &[[u8; 4]]) -> Texture {
 }
 
 fn nearest(texture: usize) -> Option<TextureRef> {
-    Some(TextureRef { texture, sampler: Sampler { nearest: true, ..Sampler::default() } })
+    Some(TextureRef { texture, sampler: Sampler { nearest: true, ..Sampler::default() }, ..TextureRef::default() })
 }
 
 fn plan(scene: &Scene, text: &str) -> Result<Plan<SceneWorld>, String> {

@@ -10,11 +10,14 @@
 //! roughness 1 reflects 1.6 times what arrives from 1 degree above the horizon), and so does a bright dielectric's sum of both parts.
 
 use crate::specular_albedo::{specular_albedo_fit, specular_albedo_integrals};
-use glam::DVec3;
+use glam::{DVec3, DVec4};
 use std::f64::consts::PI;
 
 /// Smallest alpha; smaller roughness counts as this.
 pub const MIN_ALPHA: f64 = 0.001;
+
+/// Reflectance of a dielectric of index of refraction 1.5 at normal incidence (xyz) and at grazing incidence (w).
+const DIELECTRIC: DVec4 = DVec4::new(0.04, 0.04, 0.04, 1.0);
 
 /// Normal distribution function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,10 +46,22 @@ pub struct Brdf {
 impl Brdf {
     /// From glTF parameters, each in [0, 1]; `specular` scales the whole specular lobe.
     pub fn new(base_color: DVec3, metallic: f64, roughness: f64, specular: f64, distribution: Distribution) -> Self {
+        Self::with_dielectric(base_color, metallic, roughness, specular, DIELECTRIC, distribution)
+    }
+
+    /// As [`Brdf::new`], for a dielectric part that reflects `dielectric` at normal incidence (xyz) and at grazing incidence (w), each in [0, 1].
+    pub fn with_dielectric(
+        base_color: DVec3,
+        metallic: f64,
+        roughness: f64,
+        specular: f64,
+        dielectric: DVec4,
+        distribution: Distribution,
+    ) -> Self {
         Self {
             diffuse: base_color * (1.0 - metallic) / PI,
-            reflectance_normal: specular * DVec3::splat(0.04).lerp(base_color, metallic),
-            reflectance_grazing: specular,
+            reflectance_normal: specular * dielectric.truncate().lerp(base_color, metallic),
+            reflectance_grazing: specular * (dielectric.w + (1.0 - dielectric.w) * metallic),
             alpha: (roughness * roughness).max(MIN_ALPHA),
             distribution,
         }

@@ -152,6 +152,13 @@ impl World {
                 }
                 Meeting::Surface { surface, distance, triangle } => (surface, distance, triangle),
             };
+            if surface.unlit {
+                // A colour for the eye alone, which passes draw as emission that is seen.
+                if scattered == 0 && light.set.has(LightClass::Emissive, 0) {
+                    radiance += throughput * surface.emitted;
+                }
+                break;
+            }
             if light.set.has(LightClass::Emissive, scattered) && surface.emitted != DVec3::ZERO {
                 let cosine = -surface.true_normal.dot(segment.direction);
                 let pdf = self.lights.triangle_pdf(&self.geometry, triangle, cosine, distance);

@@ -298,6 +298,8 @@ fn key(scene: &Scene, camera: &Camera, settings: &Settings) -> [u8; 32] {
         hasher.update(bytemuck::cast_slice(&mesh.normals));
         hasher.update(bytemuck::cast_slice(&mesh.tangents));
         hasher.update(bytemuck::cast_slice(&mesh.uvs));
+        hasher.update(bytemuck::cast_slice(&mesh.second_uvs));
+        hasher.update(bytemuck::cast_slice(&mesh.colors));
         hasher.update(bytemuck::cast_slice(&mesh.indices));
         hasher.update(&(mesh.material as u64).to_le_bytes());
     }

@@ -6,7 +6,7 @@ use lobelia_lobes::{
     brdf::{Brdf, Distribution},
     tonemap::srgb_decode,
 };
-use lobelia_scene::{Material, Ndf, Sampler, Scene, Texture, TextureRef, Wrap};
+use lobelia_scene::{Material, Mesh, Ndf, Sampler, Scene, Texture, TextureRef, Wrap};
 
 /// A point of a surface, seen from somewhere.
 #[derive(Clone, Copy, Debug)]
@@ -23,6 +23,16 @@ pub struct Surface {
     pub brdf: Brdf,
     /// Radiance that leaves towards the viewer by emission.
     pub emitted: DVec3,
+    /// Whether `emitted` is a colour that only the eye sees, and the surface reflects nothing.
+    pub unlit: bool,
+}
+
+/// A point of a triangle, as its vertices give it.
+#[derive(Clone, Copy, Debug)]
+struct Interpolated {
+    /// Both sets of texture coordinates.
+    uvs: [DVec2; 2],
+    color: DVec4,
 }
 
 /// Reads a scene's surfaces.
@@ -94,15 +104,22 @@ impl Surfaces {
         Self { distribution, textures: scene.textures.iter().map(Decoded::new).collect() }
     }
 
-    fn texel(&self, texture: Option<TextureRef>, uv: DVec2, srgb: bool) -> DVec4 {
-        texture.map_or(DVec4::ONE, |reference| self.textures[reference.texture].sample(reference.sampler, uv, srgb))
+    fn texel(&self, texture: Option<TextureRef>, at: &Interpolated, srgb: bool) -> DVec4 {
+        let [first, second] = at.uvs;
+        texture
+            .map_or(DVec4::ONE, |reference| self.textures[reference.texture].sample(reference.sampler, reference.uv(first, second), srgb))
     }
 
-    /// Whether a material's cut-out has a hole at a texture coordinate.
-    fn is_cut_out(&self, material: &Material, uv: DVec2) -> bool {
+    /// Colour and alpha of a material's texture and the mesh's vertices.
+    fn base(&self, material: &Material, at: &Interpolated) -> DVec4 {
+        self.texel(material.base_color_texture, at, true) * at.color
+    }
+
+    /// Whether a material's cut-out has a hole at a point.
+    fn is_cut_out(&self, material: &Material, at: &Interpolated) -> bool {
         match material.alpha_mode {
             lobelia_scene::AlphaMode::Opaque => false,
-            lobelia_scene::AlphaMode::Mask { cutoff } => self.texel(material.base_color_texture, uv, true).w < f64::from(cutoff),
+            lobelia_scene::AlphaMode::Mask { cutoff } => self.base(material, at).w < f64::from(cutoff),
         }
     }
 
@@ -115,11 +132,7 @@ impl Surfaces {
         let (weights, position) = geometry.locate(hit.triangle, segment);
         let (face, frame) = (&geometry.faces[hit.triangle], &geometry.frames[triangle.instance]);
         let corner = face.vertices.map(|vertex| vertex as usize);
-        let uv: DVec2 = corner
-            .iter()
-            .zip(weights)
-            .map(|(vertex, weight)| mesh.uvs.get(*vertex).copied().unwrap_or(Vec2::ZERO).as_dvec2() * weight)
-            .sum();
+        let uv = &interpolated(mesh, face.vertices, weights);
         if self.is_cut_out(material, uv) {
             return None;
         }
@@ -142,29 +155,40 @@ impl Surfaces {
             shading = (axis * t.x + unturned.cross(axis) * handedness * t.y + unturned * t.z).normalize_or(unturned);
         }
         let side = if unturned.dot(to_viewer) >= 0.0 { 1.0 } else { -1.0 };
-        let base = material.base_color.as_dvec3() * self.texel(material.base_color_texture, uv, true).truncate();
+        let base = material.base_color.as_dvec3() * self.base(material, uv).truncate();
+        let (normal, geometric_normal) = (shading * side, unturned * side);
+        if material.unlit {
+            let brdf = Brdf::new(DVec3::ZERO, 0.0, 1.0, 0.0, self.distribution);
+            return Some(Surface { position, normal, geometric_normal, true_normal, brdf, emitted: base, unlit: true });
+        }
         let rough = self.texel(material.metallic_roughness_texture, uv, false);
         let roughness = (f64::from(material.roughness) * rough.y).clamp(0.0, 1.0);
         let metallic = (f64::from(material.metallic) * rough.z).clamp(0.0, 1.0);
-        let brdf = Brdf::new(base, metallic, roughness, f64::from(material.specular), self.distribution);
+        let (specular, dielectric) = (f64::from(material.specular), material.dielectric);
+        // In f32 0.04 is not 0.04.
+        let brdf = if dielectric == Material::DIELECTRIC {
+            Brdf::new(base, metallic, roughness, specular, self.distribution)
+        } else {
+            Brdf::with_dielectric(base, metallic, roughness, specular, dielectric.as_dvec4(), self.distribution)
+        };
         let emitted = if true_normal.dot(to_viewer) > 0.0 {
             material.emissive.as_dvec3() * self.texel(material.emissive_texture, uv, true).truncate()
         } else {
             DVec3::ZERO
         };
-        Some(Surface { position, normal: shading * side, geometric_normal: unturned * side, true_normal, brdf, emitted })
+        Some(Surface { position, normal, geometric_normal, true_normal, brdf, emitted, unlit: false })
     }
 
     /// Mean emitted radiance of a triangle over its front: what an emissive triangle is sampled by.
     pub(crate) fn mean_emission(&self, scene: &Scene, geometry: &Geometry, triangle: usize) -> DVec3 {
         let material = &scene.materials[geometry.triangles[triangle].material];
-        if material.emissive == glam::Vec3::ZERO {
+        if !material.emits() {
             return DVec3::ZERO;
         }
         let points = [[1.0 / 3.0; 3], [0.6, 0.2, 0.2], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6]];
         let colour: DVec3 = points
             .iter()
-            .map(|weights| self.texel(material.emissive_texture, self.uv(scene, geometry, triangle, *weights), true).truncate())
+            .map(|weights| self.texel(material.emissive_texture, &self.uv(scene, geometry, triangle, *weights), true).truncate())
             .sum();
         material.emissive.as_dvec3() * colour / points.len() as f64
     }
@@ -172,12 +196,20 @@ impl Surfaces {
     /// Emitted radiance at a point of a triangle's front.
     pub(crate) fn emission(&self, scene: &Scene, geometry: &Geometry, triangle: usize, weights: [f64; 3]) -> DVec3 {
         let material = &scene.materials[geometry.triangles[triangle].material];
-        material.emissive.as_dvec3() * self.texel(material.emissive_texture, self.uv(scene, geometry, triangle, weights), true).truncate()
+        material.emissive.as_dvec3() * self.texel(material.emissive_texture, &self.uv(scene, geometry, triangle, weights), true).truncate()
     }
 
-    fn uv(&self, scene: &Scene, geometry: &Geometry, triangle: usize, weights: [f64; 3]) -> DVec2 {
+    fn uv(&self, scene: &Scene, geometry: &Geometry, triangle: usize, weights: [f64; 3]) -> Interpolated {
         let mesh = &scene.meshes[scene.instances[geometry.triangles[triangle].instance].mesh];
-        let at = |vertex: u32| mesh.uvs.get(vertex as usize).copied().unwrap_or(Vec2::ZERO).as_dvec2();
-        geometry.faces[triangle].vertices.iter().zip(weights).map(|(vertex, weight)| at(*vertex) * weight).sum()
+        interpolated(mesh, geometry.faces[triangle].vertices, weights)
     }
+}
+
+fn interpolated(mesh: &Mesh, vertices: [u32; 3], weights: [f64; 3]) -> Interpolated {
+    let corners = || vertices.iter().map(|vertex| *vertex as usize).zip(weights);
+    let uv = |set: &[Vec2]| corners().map(|(vertex, weight)| set.get(vertex).copied().unwrap_or(Vec2::ZERO).as_dvec2() * weight).sum();
+    let second = if mesh.second_uvs.is_empty() { DVec2::ZERO } else { uv(&mesh.second_uvs) };
+    let color =
+        if mesh.colors.is_empty() { DVec4::ONE } else { corners().map(|(vertex, weight)| mesh.colors[vertex].as_dvec4() * weight).sum() };
+    Interpolated { uvs: [uv(&mesh.uvs), second], color }
 }

@@ -3,7 +3,7 @@
 #import lobelia::reflective_shadow_map::{RsmFace, rsm_direction_to_light, rsm_flux, rsm_position, rsm_texel, rsm_texel_uv}
 #import lobelia::sampling_density::{density_place, density_side, reflected_flux, storable_weight}
 #import lobelia::scene::PunctualLight
-#import lobelia::surface::{PackedSurface, unpack_surface}
+#import lobelia::surface::{PackedSurface, load_specular, unpack_surface}
 
 @group(0) @binding(0) var<storage, read> faces: array<RsmFace>;
 @group(0) @binding(1) var<storage, read> lights: array<PunctualLight>;
@@ -40,7 +40,7 @@ fn texel_weight(texel: vec2u, face_index: u32) -> f32 {
     var packed: PackedSurface;
     packed.core = textureLoad(rsm_core, place, face.layer, 0).xy;
 #ifdef SPECULAR
-    packed.specular = textureLoad(rsm_specular, place, face.layer, 0).x;
+    load_specular(&packed, textureLoad(rsm_specular, place, face.layer, 0));
 #endif
 #ifdef NORMAL_MAP
     packed.geometric_normal = textureLoad(rsm_geometric_normal, place, face.layer, 0).x;

@@ -3,7 +3,7 @@
 #import lobelia::patch_moments::{PatchMoments, StoredPatchMoments, merge_patch_moments, pack_patch_moments, patch_moments_address, patch_of_texel, unpack_patch_moments}
 #import lobelia::reflective_shadow_map::{RsmFace, rsm_texel, rsm_texel_uv}
 #import lobelia::scene::PunctualLight
-#import lobelia::surface::{PackedSurface, unpack_surface}
+#import lobelia::surface::{PackedSurface, load_specular, unpack_surface}
 
 struct Settings {
     // Texels a side of the finest level, a power of two.
@@ -42,7 +42,7 @@ fn patch_at(texel: vec2u, face_index: u32) -> PatchMoments {
     var packed: PackedSurface;
     packed.core = textureLoad(rsm_core, place, face.layer, 0).xy;
 #ifdef SPECULAR
-    packed.specular = textureLoad(rsm_specular, place, face.layer, 0).x;
+    load_specular(&packed, textureLoad(rsm_specular, place, face.layer, 0));
 #endif
 #ifdef NORMAL_MAP
     packed.geometric_normal = textureLoad(rsm_geometric_normal, place, face.layer, 0).x;

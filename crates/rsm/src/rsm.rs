@@ -6,10 +6,7 @@ use lobelia_graph::{
     BuildError, CreateContext, DeviceOf, Frame, InputShapes, Need, NoPorts, OutputShapes, Pass, PlanContext, PortError, Ports,
     RasterDescription, RasterPipeline, RunError, Specialisation, TraitsOf,
 };
-use lobelia_scene::{
-    CoarseLight,
-    device::{GpuScene, ViewUniform},
-};
+use lobelia_scene::{CoarseLight, device::ViewUniform};
 use lobelia_shaders::Source;
 use serde::{Deserialize, Serialize};
 
@@ -112,12 +109,7 @@ impl Pass for RsmPass {
     fn specialise(context: &PlanContext<'_, Self>, _: &InputShapes<Self>) -> Vec<Specialisation> {
         let mut flags = SurfaceFlags::of(context.traits).specialisations();
         flags.retain(|flag| flag.flag != "EMISSIVE");
-        let mask = context.traits.alpha_mask;
-        flags.push(Specialisation::new(
-            "ALPHA_MASK",
-            mask,
-            if mask { "a material is cut out by alpha" } else { "no material is cut out by alpha" },
-        ));
+        flags.extend(SurfaceFlags::drawing(context.traits));
         flags
     }
 
@@ -170,10 +162,10 @@ impl Pass for RsmPass {
             vertex_entry: "vertex",
             fragment_entry: Some("fragment"),
             flags: context.flags,
-            vertex_buffers: &[GpuScene::vertex_layout()],
+            vertex_buffers: &context.world.vertex_layouts(),
             targets: &[
                 target(true, SurfaceFormats::CORE),
-                target(flags.specular, SurfaceFormats::SPECULAR),
+                target(flags.specular, SurfaceFormats::specular(flags)),
                 target(flags.normal_map, SurfaceFormats::GEOMETRIC_NORMAL),
             ],
             depth: Some(wgpu::DepthStencilState {

@@ -53,7 +53,14 @@ impl Builder {
         mesh.fill();
         self.meshes.push(mesh);
         let (mesh, world_from_local) = (self.meshes.len() - 1, DMat4::from_translation(at));
-        self.scene.instances.push(Instance { mesh, world_from_local, name: name.into(), area_light: None, node: None });
+        self.scene.instances.push(Instance {
+            mesh,
+            world_from_local,
+            name: name.into(),
+            area_light: None,
+            node: None,
+            node_from_local: DMat4::IDENTITY,
+        });
     }
 
     fn quad(&mut self, name: &str, material: usize, corners: [[f32; 3]; 4]) {

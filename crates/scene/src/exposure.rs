@@ -45,7 +45,10 @@ impl Scene {
 
     /// The largest channel of everything that emits.
     fn brightest_emission(&self) -> f64 {
-        let materials = self.materials.iter().map(|material| material.emissive.max_element());
+        let materials = self.materials.iter().map(|material| {
+            let seen = if material.unlit { material.base_color } else { material.emissive };
+            seen.max_element()
+        });
         let lights = self.area_lights.iter().map(|light| light.radiance.max_element());
         let environment = self.environment.iter().flat_map(|environment| {
             environment.pixels.iter().map(|pixel| pixel.max_element() * environment.scale).filter(|value| value.is_finite())

@@ -5,20 +5,25 @@
 
 mod accessor;
 pub(crate) mod area_light;
+mod extensions;
 mod image;
+mod instancing;
+mod material;
 mod open;
 mod primitive;
+mod skin;
+mod specular_glossiness;
 mod tree;
 
-use crate::{AlphaMode, Camera, Instance, LightKind, Material, Mesh, PunctualLight, Sampler, Scene, SceneError, TextureRef, Wrap, files};
+use crate::{
+    Camera, Instance, LightKind, Mesh, PunctualLight, Scene, SceneError, files,
+    pose::{Pose, Poses, Rest, Skin},
+};
 use accessor::Buffers;
 use base64::Engine;
 use glam::{DMat4, DVec3, Vec3};
 use gltf::khr_lights_punctual::Kind;
 use std::{collections::HashMap, path::Path, sync::Arc};
-
-/// The extensions that are read.
-const KNOWN_EXTENSIONS: [&str; 2] = ["KHR_lights_punctual", "KHR_materials_emissive_strength"];
 
 /// Most vertices and most triangles that all meshes together may have. A file can use the same numbers many times over, so its own size is no bound.
 const MAX_MESH_ELEMENTS: usize = 1 << 24;
@@ -37,20 +42,42 @@ pub(crate) fn load(path: &Path) -> Result<Scene, SceneError> {
 pub(crate) fn parse(bytes: &[u8], shown: &str, folder: Option<&Path>) -> Result<Scene, SceneError> {
     let mut gltf = open::open(bytes, shown)?;
     let buffers = Buffers::load(&mut gltf, shown, folder)?;
-    let mut loader =
-        Loader { shown, scene: Scene::default(), buffers, primitives: HashMap::new(), meshes: Vec::new(), mesh_elements: 0, dropped: None };
+    let mut loader = Loader {
+        shown,
+        scene: Scene::default(),
+        buffers,
+        uv_sets: Vec::new(),
+        primitives: HashMap::new(),
+        meshes: Vec::new(),
+        rests: Vec::new(),
+        skins: Vec::new(),
+        poses: Vec::new(),
+        posed: HashMap::new(),
+        mesh_elements: 0,
+        dropped: None,
+    };
     loader.extensions(&gltf);
     loader.scene.textures = Arc::new(image::load(&gltf, &loader.buffers, shown, folder)?);
     loader.materials(&gltf)?;
-    let order = loader.nodes(&gltf)?;
-    loader.animations(&gltf, &order)?;
-    loader.contents(&gltf, &order)?;
+    let (order, in_scene) = loader.nodes(&gltf)?;
+    let place: HashMap<usize, usize> = order.iter().enumerate().map(|(place, node)| (*node, place)).collect();
+    loader.animations(&gltf, &place)?;
+    loader.skins(&gltf, &place)?;
+    loader.contents(&gltf, &order[..in_scene])?;
     if let Some((count, at)) = loader.dropped.take() {
         loader.warn(format!("triangles without area are dropped: {count}, first in {at}"));
     }
-    let Loader { mut scene, meshes, .. } = loader;
+    let Loader { mut scene, meshes, rests, skins, poses, .. } = loader;
     scene.meshes = Arc::new(meshes);
+    if !poses.is_empty() {
+        scene.poses = Poses { rests: Arc::new(rests), skins: Arc::new(skins), poses };
+    }
     scene.place_nodes();
+    if let (_, Some(mesh)) = scene.pose() {
+        let name = scene.instances.iter().find(|instance| instance.mesh == mesh).map_or("", |instance| &instance.name);
+        let what = format!("node `{name}`: its joints or morph targets put it beyond the range of 32-bit floats");
+        return Err(SceneError::content(shown, what));
+    }
     for index in 0..scene.area_lights.len() {
         area_light::add_surface(&mut scene, index);
     }
@@ -94,13 +121,28 @@ struct Loader<'a> {
     shown: &'a str,
     scene: Scene,
     buffers: Buffers,
-    /// Mesh index of each glTF primitive that has been read; `None` for those that draw nothing.
-    primitives: HashMap<(usize, usize), Option<usize>>,
+    /// Which texture coordinates each material reads.
+    uv_sets: Vec<material::UvSets>,
+    /// What each glTF primitive that has been read is.
+    primitives: HashMap<(usize, usize), Known>,
     meshes: Vec<Mesh>,
+    /// Meshes that joints or morph targets can move, and their posed copies.
+    rests: Vec<Rest>,
+    skins: Vec<Skin>,
+    poses: Vec<Pose>,
+    posed: HashMap<skin::PoseKey, usize>,
     /// Vertices and triangles read so far.
     mesh_elements: usize,
     /// How many triangles had no area, and where the first was.
     dropped: Option<(usize, String)>,
+}
+
+/// What a primitive is: nothing to draw, a mesh, or what posed copies are made of.
+#[derive(Clone, Copy)]
+enum Known {
+    Nothing,
+    Still(usize),
+    Rest(usize),
 }
 
 impl Loader<'_> {
@@ -116,93 +158,12 @@ impl Loader<'_> {
     }
 
     fn extensions(&mut self, gltf: &gltf::Gltf) {
-        let other: Vec<&str> = gltf.extensions_used().filter(|name| !KNOWN_EXTENSIONS.contains(name)).collect();
+        let other: Vec<&str> = gltf.extensions_used().filter(|name| !extensions::is_known(name)).collect();
         if !other.is_empty() {
             self.warn(format!("extensions {} are ignored", other.join(", ")));
         }
-        if gltf.skins().len() > 0 {
-            self.warn("skins are ignored: meshes stand in their rest pose");
-        }
-    }
-
-    fn materials(&mut self, gltf: &gltf::Gltf) -> Result<(), SceneError> {
-        for material in gltf.materials() {
-            let read = self.material(&material)?;
-            self.scene.materials.push(read);
-        }
-        // What primitives without a material get.
-        self.scene.materials.push(Material { name: "default".into(), ..Material::default() });
-        Ok(())
-    }
-
-    fn material(&mut self, material: &gltf::Material<'_>) -> Result<Material, SceneError> {
-        let pbr = material.pbr_metallic_roughness();
-        let name = material.name().map_or_else(|| format!("material {}", material.index().unwrap_or(0)), str::to_owned);
-        let [red, green, blue, opacity] = pbr.base_color_factor();
-        if material.occlusion_texture().is_some() {
-            self.warn("occlusion textures are ignored: light is computed, not painted");
-        }
-        let emissive = Vec3::from_array(material.emissive_factor()) * material.emissive_strength().unwrap_or(1.0);
-        let read = Material {
-            base_color: Vec3::new(red, green, blue),
-            metallic: pbr.metallic_factor(),
-            roughness: pbr.roughness_factor(),
-            emissive,
-            normal_scale: material.normal_texture().map_or(1.0, |texture| texture.scale()),
-            base_color_texture: pbr.base_color_texture().map(|info| self.texture(&name, &info.texture(), info.tex_coord())),
-            metallic_roughness_texture: pbr.metallic_roughness_texture().map(|info| self.texture(&name, &info.texture(), info.tex_coord())),
-            normal_texture: material.normal_texture().map(|info| self.texture(&name, &info.texture(), info.tex_coord())),
-            emissive_texture: material.emissive_texture().map(|info| self.texture(&name, &info.texture(), info.tex_coord())),
-            alpha_mode: match material.alpha_mode() {
-                gltf::material::AlphaMode::Opaque => AlphaMode::Opaque,
-                gltf::material::AlphaMode::Mask => {
-                    AlphaMode::Mask { cutoff: texture_cutoff(material.alpha_cutoff().unwrap_or(0.5), opacity) }
-                }
-                gltf::material::AlphaMode::Blend => {
-                    self.warn("blended materials are drawn opaque");
-                    AlphaMode::Opaque
-                }
-            },
-            double_sided: material.double_sided(),
-            name,
-            ..Material::default()
-        };
-        if !(0.0..=1.0).contains(&opacity) {
-            return Err(self.fail(format!("material `{}`: the alpha of its base colour is {opacity}, but must lie in [0, 1]", read.name)));
-        }
-        if let AlphaMode::Mask { cutoff } = read.alpha_mode
-            && cutoff < 0.0
-        {
-            return Err(self.fail(format!("material `{}`: its alphaCutoff is negative", read.name)));
-        }
-        let numbers = [read.metallic, read.roughness, read.normal_scale]
-            .into_iter()
-            .chain(read.base_color.to_array())
-            .chain(read.emissive.to_array());
-        if numbers.clone().any(|number| !number.is_finite()) || read.emissive.min_element() < 0.0 {
-            return Err(self.fail(format!("material `{}`: factors must be finite and emission not negative", read.name)));
-        }
-        let in_unit = |value: f32| (0.0..=1.0).contains(&value);
-        if !read.base_color.to_array().into_iter().chain([read.metallic, read.roughness]).all(in_unit) {
-            return Err(self.fail(format!("material `{}`: base colour, metallic and roughness must lie in [0, 1]", read.name)));
-        }
-        Ok(read)
-    }
-
-    fn texture(&mut self, material: &str, texture: &gltf::Texture<'_>, set: u32) -> TextureRef {
-        if set != 0 {
-            self.warn(format!("material `{material}` reads texture coordinates {set}; set 0 is used"));
-        }
-        let wrap = |mode: gltf::texture::WrappingMode| match mode {
-            gltf::texture::WrappingMode::Repeat => Wrap::Repeat,
-            gltf::texture::WrappingMode::MirroredRepeat => Wrap::Mirror,
-            gltf::texture::WrappingMode::ClampToEdge => Wrap::Clamp,
-        };
-        let sampler = texture.sampler();
-        let nearest = sampler.mag_filter() == Some(gltf::texture::MagFilter::Nearest);
-        TextureRef {
-            texture: texture.source().index(),
-            sampler: Sampler { wrap_u: wrap(sampler.wrap_s()), wrap_v: wrap(sampler.wrap_t()), nearest },
+        for (name, lost) in gltf.extensions_used().filter_map(|name| Some((name, extensions::lost_of_file(name)?))) {
+            self.warn(format!("{name} is not read: {lost}"));
         }
     }
 
@@ -214,7 +175,7 @@ impl Loader<'_> {
             let node = &all[*index];
             let name = node.name().map_or_else(|| format!("node {index}"), str::to_owned);
             if let Some(mesh) = node.mesh() {
-                self.mesh(&mesh, place, &name)?;
+                self.mesh(gltf, node, &mesh, place, &name)?;
             }
             if let Some(light) = node.light() {
                 self.light(&light, place, moving[place], &name)?;
@@ -235,7 +196,18 @@ impl Loader<'_> {
         Ok(())
     }
 
-    fn mesh(&mut self, mesh: &gltf::Mesh<'_>, node: usize, name: &str) -> Result<(), SceneError> {
+    /// Places a node's mesh, for its skin, its weights and its instances.
+    fn mesh(
+        &mut self,
+        gltf: &gltf::Gltf,
+        at_node: &gltf::Node<'_>,
+        mesh: &gltf::Mesh<'_>,
+        node: usize,
+        name: &str,
+    ) -> Result<(), SceneError> {
+        let places = self.instances(gltf, at_node)?;
+        let skin = at_node.skin().map(|skin| skin.index());
+        let weights = at_node.weights().or_else(|| mesh.weights()).unwrap_or_default();
         for primitive in mesh.primitives() {
             let key = (mesh.index(), primitive.index());
             let read = match self.primitives.get(&key) {
@@ -246,38 +218,62 @@ impl Loader<'_> {
                     read
                 }
             };
-            if let Some(mesh) = read {
+            let at = format!("mesh {}, primitive {}", mesh.index(), primitive.index());
+            let (mesh, skinned) = match read {
+                Known::Nothing => continue,
+                Known::Still(mesh) => (mesh, false),
+                Known::Rest(rest) => {
+                    let skinned = skin.is_some() && self.rests[rest].influences.is_some();
+                    (self.posed_mesh(rest, node, skin, weights, &at)?, skinned)
+                }
+            };
+            if skin.is_some() && !skinned {
+                self.warn(format!("{at}: it has a skin, but no joints and weights, and stays at its node"));
+            }
+            for node_from_local in &places {
                 self.scene.instances.push(Instance {
                     mesh,
                     world_from_local: DMat4::IDENTITY,
                     name: name.to_owned(),
                     area_light: None,
-                    node: Some(node),
+                    // Joints put it into the world, not its node.
+                    node: (!skinned).then_some(node),
+                    node_from_local: *node_from_local,
                 });
             }
         }
         Ok(())
     }
 
-    fn primitive(&mut self, mesh: &gltf::Mesh<'_>, primitive: &gltf::Primitive<'_>) -> Result<Option<usize>, SceneError> {
+    fn primitive(&mut self, mesh: &gltf::Mesh<'_>, primitive: &gltf::Primitive<'_>) -> Result<Known, SceneError> {
         let at = format!("mesh {}, primitive {}", mesh.index(), primitive.index());
-        let material = primitive.material().index().unwrap_or(self.scene.materials.len() - 1);
-        let needs_tangents = self.scene.materials[material].normal_texture.is_some();
-        let read = primitive::read(&self.buffers, self.shown, &at, primitive, needs_tangents)?;
+        let index = primitive.material().index().unwrap_or(self.scene.materials.len() - 1);
+        let material = &self.scene.materials[index];
+        let reading = primitive::Reading {
+            uv_sets: self.uv_sets[index],
+            textured: material.textures().iter().any(Option::is_some),
+            normal_map: material.normal_texture.as_ref(),
+        };
+        let read = primitive::read(&self.buffers, self.shown, &at, primitive, &reading)?;
         for warning in read.warnings {
             self.warn(warning);
         }
         if read.dropped > 0 {
             self.dropped.get_or_insert((0, at.clone())).0 += read.dropped;
         }
-        let Some(mut mesh) = read.mesh else { return Ok(None) };
-        self.mesh_elements += mesh.positions.len() + mesh.indices.len() / 3;
+        let Some(mut rest) = read.rest else { return Ok(Known::Nothing) };
+        self.mesh_elements += rest.size();
         if self.mesh_elements > MAX_MESH_ELEMENTS {
             return Err(self.fail(format!("{at}: the meshes have more than {MAX_MESH_ELEMENTS} vertices and triangles")));
         }
-        mesh.material = material;
-        self.meshes.push(mesh);
-        Ok(Some(self.meshes.len() - 1))
+        rest.mesh.material = index;
+        if rest.can_move() {
+            self.rests.push(rest);
+            Ok(Known::Rest(self.rests.len() - 1))
+        } else {
+            self.meshes.push(rest.mesh);
+            Ok(Known::Still(self.meshes.len() - 1))
+        }
     }
 
     fn light(&mut self, light: &gltf::khr_lights_punctual::Light<'_>, node: usize, animated: bool, name: &str) -> Result<(), SceneError> {
@@ -322,11 +318,6 @@ impl Loader<'_> {
         self.scene.cameras.push(Camera { name: name.to_owned(), position, forward, up, right, yfov, near, unusable, node: Some(node) });
         Ok(())
     }
-}
-
-/// The cutoff for the texture's alpha alone: glTF compares its product with the factor's alpha. Above 1 nothing is left.
-fn texture_cutoff(cutoff: f32, opacity: f32) -> f32 {
-    if cutoff <= opacity { cutoff / opacity.max(f32::MIN_POSITIVE) } else { AlphaMode::NOTHING_LEFT }
 }
 
 /// What must hold of any punctual light, wherever it is written.

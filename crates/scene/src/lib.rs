@@ -34,8 +34,8 @@
 //! A glTF node with `extras.area_light` is a light with extent: `{"shape": "quad", "width", "height"}`, `{"shape": "disk", "radius"}` or
 //! `{"shape": "sphere", "radius"}`, each with `"radiance": [r, g, b]`; quad and disk emit towards local -Z.
 //!
-//! Not drawn as the file says, with a word in [`Scene::warnings`]: blended surfaces (opaque here), skins and morph targets, vertex colours, occlusion
-//! textures, points and lines, ranges of lights, texture coordinates other than set 0, and extensions that are not required.
+//! Not drawn as the file says, with a word in [`Scene::warnings`]: blended surfaces (opaque here), occlusion textures, points and lines, ranges of
+//! lights, and what the table in `docs/gltf.md` says of extensions.
 
 mod animation;
 mod builtin;
@@ -51,6 +51,7 @@ mod mesh;
 mod motion;
 mod ndf;
 mod nodes;
+mod pose;
 mod seen;
 mod sight;
 mod tangents;
@@ -62,7 +63,7 @@ pub use builtin::builtin_names;
 pub use camera::Camera;
 pub use error::SceneError;
 pub use light::{AreaLight, AreaShape, Environment, LightKind, PunctualLight, triangulate};
-pub use material::{AlphaMode, MIN_ALPHA, Material, Sampler, Texture, TextureRef, Wrap};
+pub use material::{AlphaMode, MIN_ALPHA, Material, Sampler, Texture, TextureRef, UvSet, Wrap};
 pub use mesh::{Mesh, Triangle};
 pub use ndf::Ndf;
 pub use sight::{Lookout, Sight};
@@ -71,7 +72,7 @@ pub use transport::{LightClass, LightTransport};
 
 use glam::{DMat4, DVec3};
 use nodes::NodeTree;
-use std::sync::Arc;
+use std::{collections::HashMap, sync::Arc};
 
 /// Most triangles that all instances together may have, so that a small file with many instances cannot ask for unbounded memory.
 const MAX_TRIANGLES: usize = 1 << 25;
@@ -105,6 +106,7 @@ pub struct Scene {
     /// What the file asked for that is not done, in words.
     pub warnings: Vec<String>,
     nodes: NodeTree,
+    poses: pose::Poses,
     motions: Vec<motion::LightMotion>,
     version: u64,
 }
@@ -121,6 +123,8 @@ pub struct Instance {
     /// The area light whose surface this is.
     pub area_light: Option<usize>,
     pub(crate) node: Option<usize>,
+    /// Coordinates of the node from local ones: where an instance of `EXT_mesh_gpu_instancing` is at its node.
+    pub(crate) node_from_local: DMat4,
 }
 
 impl Scene {
@@ -190,6 +194,8 @@ impl Scene {
         if self.nodes.is_animated() {
             self.nodes.animate(seconds);
             moved = self.place_nodes();
+            // A pose beyond the range of floats leaves the mesh as it was.
+            moved |= self.pose().0;
         }
         moved |= self.move_lights(seconds);
         self.version += u64::from(moved);
@@ -216,7 +222,7 @@ impl Scene {
         let of = |node: Option<usize>| node.and_then(|node| world.get(node)).copied().filter(|matrix| matrix.is_finite());
         let mut moved = false;
         for instance in &mut self.instances {
-            if let Some(matrix) = of(instance.node) {
+            if let Some(matrix) = of(instance.node).map(|matrix| matrix * instance.node_from_local) {
                 moved |= instance.world_from_local != matrix;
                 instance.world_from_local = matrix;
             }
@@ -241,6 +247,37 @@ impl Scene {
             }
         }
         moved
+    }
+
+    /// Poses meshes by their joints and morph targets; whether anything moved, and the mesh of a pose that is beyond the range of floats.
+    pub(crate) fn pose(&mut self) -> (bool, Option<usize>) {
+        let world = self.nodes.world_matrices();
+        let nodes = &self.nodes;
+        let (mut placed, mut failed) = (HashMap::new(), None);
+        for posed in self.poses.update(&world, |node| nodes.weights_of(node)) {
+            match posed {
+                Ok(pose::Posed { index, mesh, world_from_local }) => {
+                    Arc::make_mut(&mut self.meshes)[index] = mesh;
+                    placed.insert(index, world_from_local);
+                }
+                Err(mesh) => failed = failed.or(Some(mesh)),
+            }
+        }
+        if !placed.is_empty() {
+            for instance in &mut self.instances {
+                instance.world_from_local = placed.get(&instance.mesh).copied().flatten().unwrap_or(instance.world_from_local);
+            }
+        }
+        (!placed.is_empty(), failed)
+    }
+
+    /// The meshes that joints or morph targets moved since `before`, the same scene at another time.
+    pub(crate) fn moved_meshes(&self, before: &Scene) -> Vec<usize> {
+        if Arc::ptr_eq(&self.meshes, &before.meshes) {
+            return Vec::new();
+        }
+        let poses = self.poses.poses.iter().map(|pose| pose.mesh);
+        poses.filter(|mesh| self.meshes.get(*mesh) != before.meshes.get(*mesh)).collect()
     }
 
     /// Takes all lights away, area lights with their surfaces. Emissive materials and the environment stay.

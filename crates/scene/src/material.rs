@@ -1,6 +1,6 @@
 //! Surfaces: how they reflect and emit, and the textures that say so.
 
-use glam::Vec3;
+use glam::{Affine2, DVec2, Vec3, Vec4};
 use std::fmt;
 
 /// Smallest alpha (roughness squared) of a specular lobe; smaller roughness counts as this.
@@ -23,6 +23,11 @@ pub struct Material {
     pub emits_both_ways: bool,
     /// Scale of the specular lobe, [0, 1]. 1 in every glTF file; 0 makes a surface purely Lambertian, metals black.
     pub specular: f32,
+    /// Reflectance of the dielectric part (what is not metallic) at normal incidence, xyz, and at grazing incidence, w; each in [0, 1]. 0.04 and 1
+    /// unless the file gives an index of refraction or a specular factor.
+    pub dielectric: Vec4,
+    /// Whether it is drawn in its base colour whatever the light: it reflects nothing and lights nothing, but stands in the way of light.
+    pub unlit: bool,
     /// Scale of the normal map's x and y.
     pub normal_scale: f32,
     /// Multiplies `base_color`; sRGB.
@@ -49,6 +54,8 @@ impl Default for Material {
             emissive: Vec3::ZERO,
             emits_both_ways: false,
             specular: 1.0,
+            dielectric: Material::DIELECTRIC,
+            unlit: false,
             normal_scale: 1.0,
             base_color_texture: None,
             metallic_roughness_texture: None,
@@ -61,6 +68,19 @@ impl Default for Material {
 }
 
 impl Material {
+    /// A dielectric of index of refraction 1.5: `((1.5 - 1) / (1.5 + 1))^2` at normal incidence.
+    pub const DIELECTRIC: Vec4 = Vec4::new(0.04, 0.04, 0.04, 1.0);
+
+    /// The textures that are read: base colour, metallic-roughness, normal, emission.
+    pub fn textures(&self) -> [Option<TextureRef>; 4] {
+        [self.base_color_texture, self.metallic_roughness_texture, self.normal_texture, self.emissive_texture]
+    }
+
+    /// Whether it lights other surfaces.
+    pub fn emits(&self) -> bool {
+        !self.unlit && self.emissive.max_element() > 0.0
+    }
+
     /// Alpha of its specular lobe where the texture is white.
     pub fn alpha(&self) -> f32 {
         (self.roughness * self.roughness).max(MIN_ALPHA)
@@ -86,12 +106,38 @@ impl AlphaMode {
 }
 
 /// A texture and how it is read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TextureRef {
     /// Index into [`crate::Scene::textures`].
     pub texture: usize,
     /// Wrapping and filtering.
     pub sampler: Sampler,
+    /// Which of the mesh's texture coordinates it is read at.
+    pub uv_set: UvSet,
+    /// From the mesh's texture coordinates to those of the image; finite. The identity unless the file moves, turns or scales the image.
+    pub uv_transform: Affine2,
+}
+
+impl TextureRef {
+    /// Where it is read for a vertex's (or an interpolated) texture coordinates of both sets.
+    pub fn uv(&self, first: DVec2, second: DVec2) -> DVec2 {
+        let uv = if self.uv_set == UvSet::Second { second } else { first };
+        if self.uv_transform == Affine2::IDENTITY {
+            return uv;
+        }
+        let [x, y, offset] = [self.uv_transform.matrix2.x_axis, self.uv_transform.matrix2.y_axis, self.uv_transform.translation];
+        x.as_dvec2() * uv.x + y.as_dvec2() * uv.y + offset.as_dvec2()
+    }
+}
+
+/// One of the two sets of texture coordinates that a mesh can have.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum UvSet {
+    /// [`crate::Mesh::uvs`].
+    #[default]
+    First,
+    /// [`crate::Mesh::second_uvs`].
+    Second,
 }
 
 /// Wrapping and filtering. There are no mipmaps: filtering is on the full-resolution level.

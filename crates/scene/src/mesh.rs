@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
-/// An indexed triangle mesh. All arrays but `indices` have one element per vertex.
+/// An indexed triangle mesh. All arrays but `indices` have one element per vertex, or none where they say so.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     /// Local coordinates.
@@ -11,8 +11,12 @@ pub struct Mesh {
     pub normals: Vec<Vec3>,
     /// Unit xyz and handedness w = +-1; all 0 where no normal map needs them.
     pub tangents: Vec<Vec4>,
-    /// (0, 0) is the top left corner of the image.
+    /// (0, 0) is the top left corner of the image. The first of the file's sets that the material's textures read.
     pub uvs: Vec<Vec2>,
+    /// The other set of texture coordinates that the material's textures read; empty where all read the same.
+    pub second_uvs: Vec<Vec2>,
+    /// Linear colour and alpha, each in [0, 1], that the base colour is multiplied with; empty where the file has none.
+    pub colors: Vec<Vec4>,
     /// Three per triangle.
     pub indices: Vec<u32>,
     /// Index into the scene's materials.
@@ -43,6 +47,8 @@ impl Mesh {
         pick(&mut self.normals, &order);
         pick(&mut self.tangents, &order);
         pick(&mut self.uvs, &order);
+        pick(&mut self.second_uvs, &order);
+        pick(&mut self.colors, &order);
         self.indices = (0..order.len() as u32).collect();
     }
 
@@ -67,6 +73,11 @@ impl Mesh {
     pub(crate) fn flat_normals(&mut self) {
         self.normals.clear();
         self.unweld();
+        self.set_flat_normals();
+    }
+
+    /// As [`Mesh::flat_normals`], for triangles that share no vertex and stand in order.
+    pub(crate) fn set_flat_normals(&mut self) {
         self.normals = self
             .positions
             .chunks_exact(3)
@@ -100,7 +111,7 @@ impl Mesh {
         count
     }
 
-    /// Fills what no file gave with zeros, so that all arrays are as long as the positions.
+    /// Fills what no file gave with zeros, so that all arrays are as long as the positions but those that may be empty.
     pub(crate) fn fill(&mut self) {
         let count = self.positions.len();
         self.uvs.resize(count, Vec2::ZERO);

@@ -1,6 +1,6 @@
 //! The node tree: who hangs below whom, and where that puts them.
 
-use crate::animation::Channel;
+use crate::animation::{Channel, WeightChannel};
 use glam::{DMat4, DQuat, DVec3};
 
 /// Translation, rotation and scale, or a matrix that no animation touches.
@@ -32,16 +32,20 @@ pub(crate) struct Node {
 pub(crate) struct NodeTree {
     pub nodes: Vec<Node>,
     pub channels: Vec<Channel>,
+    pub weight_channels: Vec<WeightChannel>,
+    /// What the channels above give now, in their order; empty before the first moment is set.
+    pub weights: Vec<Vec<f64>>,
     pub origin: Option<DVec3>,
 }
 
 impl NodeTree {
     pub fn is_animated(&self) -> bool {
-        !self.channels.is_empty()
+        !(self.channels.is_empty() && self.weight_channels.is_empty())
     }
 
     pub fn animation_seconds(&self) -> f32 {
-        self.channels.iter().map(Channel::end).fold(0.0, f32::max)
+        let ends = self.channels.iter().map(Channel::end).chain(self.weight_channels.iter().map(WeightChannel::end));
+        ends.fold(0.0, f32::max)
     }
 
     pub fn animate(&mut self, seconds: f32) {
@@ -51,6 +55,14 @@ impl NodeTree {
         for channel in &self.channels {
             channel.apply(seconds, &mut self.nodes[channel.node].now);
         }
+        self.weights = self.weight_channels.iter().map(|channel| channel.sample(seconds)).collect();
+    }
+
+    /// The animated weights of a node's morph targets; `None` where no animation drives them, or none has been played. Of several animations the last
+    /// holds, as it does for transforms.
+    pub fn weights_of(&self, node: usize) -> Option<&[f64]> {
+        let channels = self.weight_channels.iter().zip(&self.weights);
+        channels.rev().find(|(channel, _)| channel.node == node).map(|(_, weights)| weights.as_slice())
     }
 
     pub fn world_matrices(&self) -> Vec<DMat4> {

@@ -1,9 +1,10 @@
 //! Tangents where a file has none: Mikkelsen's tangent space, as glTF asks.
 
-use crate::Mesh;
-use glam::{Vec3, Vec4};
+use crate::{Mesh, TextureRef};
+use glam::{Vec2, Vec3, Vec4};
 
-struct Corners<'a>(&'a mut Mesh);
+/// A mesh, and where its normal map is read: one pair of texture coordinates for each corner.
+struct Corners<'a>(&'a mut Mesh, &'a [Vec2]);
 
 impl bevy_mikktspace::Geometry for Corners<'_> {
     fn num_faces(&self) -> usize {
@@ -20,7 +21,7 @@ impl bevy_mikktspace::Geometry for Corners<'_> {
     }
     fn tex_coord(&self, face: usize, corner: usize) -> [f32; 2] {
         // The algorithm's v points up, glTF's down.
-        let uv = self.0.uvs[3 * face + corner];
+        let uv = self.1[3 * face + corner];
         [uv.x, 1.0 - uv.y]
     }
     fn set_tangent(&mut self, tangent: Option<bevy_mikktspace::TangentSpace>, face: usize, corner: usize) {
@@ -29,11 +30,15 @@ impl bevy_mikktspace::Geometry for Corners<'_> {
     }
 }
 
-/// Computes tangents; vertices are unwelded, for tangents differ between triangles that share one. `false` if the mesh has no usable texture coordinates.
-pub(crate) fn generate(mesh: &mut Mesh) -> bool {
+/// Computes tangents along the normal map `map` as it lies on the mesh, moved, turned and scaled; vertices are unwelded, for tangents differ between
+/// triangles that share one. `false` if the mesh has no usable texture coordinates.
+pub(crate) fn generate(mesh: &mut Mesh, map: &TextureRef) -> bool {
     mesh.unweld();
     mesh.tangents = vec![Vec4::ZERO; mesh.positions.len()];
-    let made = bevy_mikktspace::generate_tangents(&mut Corners(mesh)).is_ok();
+    let at = |uvs: &[Vec2], vertex: usize| uvs.get(vertex).copied().unwrap_or_default().as_dvec2();
+    let uvs: Vec<Vec2> =
+        (0..mesh.positions.len()).map(|vertex| map.uv(at(&mesh.uvs, vertex), at(&mesh.second_uvs, vertex)).as_vec2()).collect();
+    let made = bevy_mikktspace::generate_tangents(&mut Corners(mesh, &uvs)).is_ok();
     made && mesh.tangents.iter().any(|tangent| tangent.truncate() != Vec3::ZERO)
 }
 
@@ -41,7 +46,7 @@ pub(crate) fn generate(mesh: &mut Mesh) -> bool {
 mod tests {
     #![allow(clippy::unwrap_used)]
 
-    use crate::Scene;
+    use crate::{Scene, TextureRef};
     use glam::Vec4;
 
     /// Tangents that other programs wrote into files, generated anew.
@@ -58,7 +63,7 @@ mod tests {
             let (mut corners, mut same) = (0, 0);
             for mesh in scene.meshes.iter().filter(|mesh| mesh.tangents.iter().any(|tangent| *tangent != Vec4::ZERO)) {
                 let mut anew = mesh.clone();
-                assert!(super::generate(&mut anew));
+                assert!(super::generate(&mut anew, &TextureRef::default()));
                 for (corner, index) in mesh.indices.iter().enumerate() {
                     let (theirs, ours) = (mesh.tangents[*index as usize], anew.tangents[corner]);
                     corners += 1;

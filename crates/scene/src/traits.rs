@@ -1,7 +1,7 @@
 //! Facts of a scene that passes ask.
 
-use crate::{AlphaMode, AreaShape, LightKind, MIN_ALPHA, Material, Ndf, Scene};
-use glam::DVec3;
+use crate::{AlphaMode, AreaShape, LightKind, MIN_ALPHA, Material, Ndf, Scene, TextureRef, UvSet};
+use glam::{Affine2, DVec3};
 use serde::Serialize;
 
 /// Half angle in radians up to which a spot light is seen by one square face; wider ones take six, like points.
@@ -80,10 +80,20 @@ pub struct SceneTraits {
     pub normal_maps: bool,
     /// Whether any material is cut out by alpha.
     pub alpha_mask: bool,
-    /// Whether any material emits.
+    /// Whether any material emits and so lights others.
     pub emissive: bool,
     /// Instances whose material emits, those of area lights not counted.
     pub emissive_surfaces: usize,
+    /// Whether any material is drawn in its colour whatever the light ([`Material::unlit`]).
+    pub unlit: bool,
+    /// Whether any dielectric has another reflectance than [`Material::DIELECTRIC`].
+    pub dielectric: bool,
+    /// Whether any mesh has colours.
+    pub vertex_colors: bool,
+    /// Whether any material reads two sets of texture coordinates.
+    pub second_uvs: bool,
+    /// Whether any texture is moved, turned, scaled or read at the second set of texture coordinates.
+    pub texture_transforms: bool,
     /// Whether any material has a base-colour texture.
     pub base_color_textures: bool,
     /// Whether any material has a metallic-roughness texture.
@@ -142,6 +152,7 @@ impl SceneTraits {
     pub fn unspecialised(&self) -> Self {
         // Code for every shape of area light, where there is one at all.
         let shapes = usize::from(self.area_lights() > 0);
+        // Vertex colours, second texture coordinates and transforms of textures stay what they are: where there are none, the device has no buffer of them.
         Self {
             disk_lights: self.disk_lights.max(shapes),
             sphere_lights: self.sphere_lights.max(shapes),
@@ -150,6 +161,8 @@ impl SceneTraits {
             normal_maps: true,
             alpha_mask: true,
             emissive: true,
+            unlit: true,
+            dielectric: true,
             base_color_textures: true,
             metallic_roughness_textures: true,
             emissive_textures: true,
@@ -161,7 +174,7 @@ impl SceneTraits {
     pub fn facts(&self) -> Vec<(&'static str, String)> {
         let yes = |on: bool| (if on { "yes" } else { "no" }).to_owned();
         let size = self.bounds.max - self.bounds.min;
-        vec![
+        let mut facts = vec![
             ("triangles", self.triangles.to_string()),
             ("instances", self.instances.to_string()),
             ("materials", self.materials.to_string()),
@@ -188,7 +201,16 @@ impl SceneTraits {
             ("environment map", yes(self.environment)),
             ("animation (s)", if self.animated { format!("{:.3}", self.animation_seconds) } else { "none".into() }),
             ("normal distribution", self.ndf.to_string()),
-        ]
+        ];
+        let rare = [
+            ("unlit surfaces", self.unlit),
+            ("other dielectrics than of index 1.5", self.dielectric),
+            ("vertex colours", self.vertex_colors),
+            ("second texture coordinates", self.second_uvs),
+            ("transformed textures", self.texture_transforms),
+        ];
+        facts.extend(rare.into_iter().filter(|(_, there)| *there).map(|(name, there)| (name, yes(there))));
+        facts
     }
 }
 
@@ -209,11 +231,11 @@ pub(crate) fn of(scene: &Scene) -> SceneTraits {
     }
     let materials: Vec<&Material> = scene.materials.iter().zip(&used).filter(|(_, used)| **used).map(|(material, _)| material).collect();
     let any = |fact: fn(&Material) -> bool| materials.iter().any(|material| fact(material));
-    let specular = materials.iter().filter(|material| material.specular > 0.0);
+    let specular = materials.iter().filter(|material| material.specular > 0.0 && !material.unlit);
     let alphas = specular.map(|material| least_roughness(scene, material).powi(2).max(MIN_ALPHA));
     let lights = |fits: fn(&LightKind) -> bool| scene.lights.iter().filter(|light| fits(&light.kind)).count();
     let area = |fits: fn(&AreaShape) -> bool| scene.area_lights.iter().filter(|light| fits(&light.shape)).count();
-    let emits = |mesh: usize| scene.materials[scene.meshes[mesh].material].emissive.max_element() > 0.0;
+    let emits = |mesh: usize| scene.materials[scene.meshes[mesh].material].emits();
     let wide = |kind: &LightKind| match kind {
         LightKind::Point => true,
         LightKind::Spot { outer, .. } => *outer > CUBE_FACE_OUTER,
@@ -225,13 +247,21 @@ pub(crate) fn of(scene: &Scene) -> SceneTraits {
         instances: scene.instances.len(),
         materials: materials.len(),
         textures: scene.textures.len(),
-        specular: any(|material| material.specular > 0.0),
+        specular: any(|material| material.specular > 0.0 && !material.unlit),
         sharpest_alpha: alphas.reduce(f32::min),
-        metallic: any(|material| material.metallic > 0.0),
+        metallic: any(|material| material.metallic > 0.0 && !material.unlit),
         normal_maps: any(|material| material.normal_texture.is_some()),
         alpha_mask: any(|material| material.alpha_mode != AlphaMode::Opaque),
-        emissive: any(|material| material.emissive.max_element() > 0.0),
         emissive_surfaces: scene.instances.iter().filter(|instance| instance.area_light.is_none() && emits(instance.mesh)).count(),
+        emissive: any(Material::emits),
+        unlit: any(|material| material.unlit),
+        dielectric: any(|material| material.specular > 0.0 && !material.unlit && material.dielectric != Material::DIELECTRIC),
+        vertex_colors: scene.instances.iter().any(|instance| !scene.meshes[instance.mesh].colors.is_empty()),
+        second_uvs: any(|material| material.textures().iter().flatten().any(|texture| texture.uv_set == UvSet::Second)),
+        texture_transforms: any(|material| {
+            let moved = |texture: &TextureRef| texture.uv_set == UvSet::Second || texture.uv_transform != Affine2::IDENTITY;
+            material.textures().iter().flatten().any(moved)
+        }),
         base_color_textures: any(|material| material.base_color_texture.is_some()),
         metallic_roughness_textures: any(|material| material.metallic_roughness_texture.is_some()),
         emissive_textures: any(|material| material.emissive_texture.is_some()),

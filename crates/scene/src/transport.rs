@@ -152,7 +152,9 @@ impl LightTransport {
     /// Only the light of lights that a scene has.
     #[must_use]
     pub fn within(&self, traits: &SceneTraits) -> Self {
-        self.only(|class| traits.lights_of(class) > 0)
+        let kept = self.only(|class| traits.lights_of(class) > 0);
+        // Surfaces that are drawn in their colour are seen as those that emit, and light nothing.
+        if traits.unlit && self.has(LightClass::Emissive, 0) { kept.and(LightClass::Emissive, [0]) } else { kept }
     }
 
     /// What is left when `other` is taken away.

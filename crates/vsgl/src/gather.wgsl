@@ -9,7 +9,7 @@
 #import lobelia::math::{safe_normalize, storable}
 #import lobelia::sg_light::solid_angle_over_disk_area
 #import lobelia::scene::{View, scene_position, view_depth}
-#import lobelia::surface::{PackedSurface, Surface, unpack_surface}
+#import lobelia::surface::{PackedSurface, Surface, load_specular, unpack_surface}
 #import lobelia::virtual_lights::{VirtualLight, VirtualLightLobes, virtual_light_surface}
 #import lobelia::vsgl::{SgLight, SgReceiver, sg_light_of_lobes, sg_light_of_point, sg_receiver, vsgl_accurate, vsgl_fast, vsgl_gaussian, vsgl_is_point, vsgl_printed}
 
@@ -83,7 +83,7 @@ fn load_surface(pixel: vec2u) -> Surface {
     var packed: PackedSurface;
     packed.core = textureLoad(gbuffer_core, pixel, 0).xy;
 #ifdef SPECULAR
-    packed.specular = textureLoad(gbuffer_specular, pixel, 0).x;
+    load_specular(&packed, textureLoad(gbuffer_specular, pixel, 0));
 #endif
 #ifdef NORMAL_MAP
     packed.geometric_normal = textureLoad(gbuffer_geometric_normal, pixel, 0).x;

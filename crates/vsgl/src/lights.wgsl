@@ -9,7 +9,7 @@
 #import lobelia::sampling::r2_point
 #import lobelia::sampling_density::{density_weight, sample_density, sampling_density_total}
 #import lobelia::scene::PunctualLight
-#import lobelia::surface::{PackedSurface, shading_normal_factor, unpack_surface}
+#import lobelia::surface::{PackedSurface, load_specular, shading_normal_factor, unpack_surface}
 #import lobelia::virtual_lights::{VirtualLight, VirtualLightLobes}
 
 struct Settings {
@@ -48,7 +48,7 @@ fn packed_texel(texel: vec2u, face: RsmFace) -> PackedSurface {
     var packed: PackedSurface;
     packed.core = textureLoad(rsm_core, place, face.layer, 0).xy;
 #ifdef SPECULAR
-    packed.specular = textureLoad(rsm_specular, place, face.layer, 0).x;
+    load_specular(&packed, textureLoad(rsm_specular, place, face.layer, 0));
 #endif
 #ifdef NORMAL_MAP
     packed.geometric_normal = textureLoad(rsm_geometric_normal, place, face.layer, 0).x;
@@ -212,6 +212,9 @@ fn pick(@builtin(global_invocation_id) id: vec3u) {
     light.flux = min(flux / (f32(settings.count) * sample.probability), vec3f(1e24));
 #ifdef SPECULAR
     light.specular = packed.specular;
+#endif
+#ifdef DIELECTRIC
+    light.dielectric = packed.dielectric;
 #endif
     light.core = packed.core;
     light.source = face.light;

@@ -89,6 +89,9 @@ fn point_of(sum: Gathered, surface: Surface) -> VirtualLight {
     let packed = pack_surface(surface);
     light.core = packed.core;
     light.specular = packed.specular;
+#ifdef DIELECTRIC
+    light.dielectric = packed.dielectric;
+#endif
     light.source = faces[sum.face].light;
     return light;
 }

@@ -10,7 +10,7 @@
 #import lobelia::math::{TAU, safe_normalize, storable}
 #import lobelia::sampling::{hash, r2_point, unit_float}
 #import lobelia::scene::{View, scene_position, view_depth}
-#import lobelia::surface::{PackedSurface, Surface, unpack_surface}
+#import lobelia::surface::{PackedSurface, Surface, load_specular, unpack_surface}
 #import lobelia::virtual_lights::{VirtualLight, virtual_light_surface}
 
 struct Settings {
@@ -84,7 +84,7 @@ fn load_surface(pixel: vec2u) -> Surface {
     var packed: PackedSurface;
     packed.core = textureLoad(gbuffer_core, pixel, 0).xy;
 #ifdef SPECULAR
-    packed.specular = textureLoad(gbuffer_specular, pixel, 0).x;
+    load_specular(&packed, textureLoad(gbuffer_specular, pixel, 0));
 #endif
 #ifdef NORMAL_MAP
     packed.geometric_normal = textureLoad(gbuffer_geometric_normal, pixel, 0).x;

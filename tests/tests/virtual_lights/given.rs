@@ -139,7 +139,7 @@ struct Targets {
 }";
 
 fn surface_flags(params: &SurfaceParams) -> SurfaceFlags {
-    SurfaceFlags { specular: params.specular, normal_map: params.normal_map, emissive: false }
+    SurfaceFlags { specular: params.specular, normal_map: params.normal_map, emissive: false, dielectric: false }
 }
 
 impl Pass for GivenGBuffer {
@@ -172,7 +172,7 @@ impl Pass for GivenGBuffer {
             vertex_buffers: &[],
             targets: &[
                 target(true, SurfaceFormats::CORE),
-                target(flags.specular, SurfaceFormats::SPECULAR),
+                target(flags.specular, SurfaceFormats::specular(flags)),
                 target(flags.normal_map, SurfaceFormats::GEOMETRIC_NORMAL),
             ],
             depth: Some(wgpu::DepthStencilState {

@@ -1,7 +1,7 @@
 //! `builtin:area-lights`: every shape of area light over a floor whose strips grow rougher towards the viewer.
 
 use super::{Builder, add_quad};
-use crate::{AreaLight, AreaShape, Mesh, Sampler, Scene, Texture, TextureRef, gltf::area_light::add_surface};
+use crate::{AreaLight, AreaShape, Mesh, Scene, Texture, TextureRef, gltf::area_light::add_surface};
 use glam::{DMat4, DQuat, DVec3, Vec2, Vec3};
 use std::{f64::consts::PI, sync::Arc};
 
@@ -35,7 +35,7 @@ pub(super) fn area_lights() -> Scene {
     for (index, roughness) in ROUGHNESS.into_iter().enumerate() {
         let name = format!("strip {roughness:.2}");
         let material = build.material(&name, [0.75, 0.75, 0.75], 0.5, roughness);
-        build.scene.materials[material].base_color_texture = Some(TextureRef { texture: 0, sampler: Sampler::default() });
+        build.scene.materials[material].base_color_texture = Some(TextureRef::default());
         let (far, near) = (back + depth * index as f32, back + depth * (index + 1) as f32);
         let mut mesh = Mesh::default();
         add_quad(&mut mesh, [[left, 0.0, near], [-left, 0.0, near], [-left, 0.0, far], [left, 0.0, far]].map(Vec3::from_array));

@@ -1,12 +1,13 @@
 //! Bind groups of materials, and the textures they read.
 
-use super::uniform::{MaterialUniform, material_bytes};
+use super::uniform::{MaterialUniform, TextureTransformsUniform, material_bytes, texture_transform_bytes};
 use crate::{Material, Sampler, Scene, Texture, TextureRef, Wrap};
 use encase::ShaderType;
 use half::f16;
 use std::collections::HashMap;
 
-pub(super) fn material_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+/// `transforms` is whether textures are transformed or read at second coordinates.
+pub(super) fn material_layout(device: &wgpu::Device, transforms: bool) -> wgpu::BindGroupLayout {
     let entry = |binding: u32, ty: wgpu::BindingType| wgpu::BindGroupLayoutEntry {
         binding,
         visibility: wgpu::ShaderStages::FRAGMENT,
@@ -18,14 +19,14 @@ pub(super) fn material_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
         view_dimension: wgpu::TextureViewDimension::D2,
         multisampled: false,
     };
-    let uniform = wgpu::BindingType::Buffer {
-        ty: wgpu::BufferBindingType::Uniform,
-        has_dynamic_offset: false,
-        min_binding_size: Some(MaterialUniform::min_size()),
-    };
-    let mut entries = vec![entry(0, uniform)];
+    let uniform =
+        |size| wgpu::BindingType::Buffer { ty: wgpu::BufferBindingType::Uniform, has_dynamic_offset: false, min_binding_size: Some(size) };
+    let mut entries = vec![entry(0, uniform(MaterialUniform::min_size()))];
     entries.extend((1..5).map(|binding| entry(binding, texture)));
     entries.extend((5..9).map(|binding| entry(binding, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering))));
+    if transforms {
+        entries.push(entry(9, uniform(TextureTransformsUniform::min_size())));
+    }
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("material"), entries: &entries })
 }
 
@@ -67,7 +68,8 @@ impl Materials {
         scene: &Scene,
         pre_exposure: f32,
     ) -> Vec<wgpu::BindGroup> {
-        scene.materials.iter().map(|material| self.bind_group(device, queue, layout, material, pre_exposure)).collect()
+        let transforms = scene.traits().texture_transforms;
+        scene.materials.iter().map(|material| self.bind_group(device, queue, layout, material, pre_exposure, transforms)).collect()
     }
 
     fn bind_group(
@@ -77,15 +79,20 @@ impl Materials {
         layout: &wgpu::BindGroupLayout,
         material: &Material,
         pre_exposure: f32,
+        transforms: bool,
     ) -> wgpu::BindGroup {
-        let bytes = material_bytes(material, pre_exposure);
-        let uniform = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(&material.name),
-            size: bytes.len() as u64,
-            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        queue.write_buffer(&uniform, 0, &bytes);
+        let buffer = |bytes: &[u8]| {
+            let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(&material.name),
+                size: bytes.len() as u64,
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            });
+            queue.write_buffer(&buffer, 0, bytes);
+            buffer
+        };
+        let uniform = buffer(&material_bytes(material, pre_exposure));
+        let transforms = transforms.then(|| buffer(&texture_transform_bytes(material)));
         let mut entries = vec![wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() }];
         for (index, (reference, srgb)) in references(material).into_iter().enumerate() {
             let absent = if index == 2 { &self.flat_normal } else { &self.white };
@@ -96,6 +103,7 @@ impl Materials {
                 entries.push(wgpu::BindGroupEntry { binding: 5 + index as u32, resource: wgpu::BindingResource::Sampler(sampler) });
             }
         }
+        entries.extend(transforms.as_ref().map(|buffer| wgpu::BindGroupEntry { binding: 9, resource: buffer.as_entire_binding() }));
         device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(&material.name), layout, entries: &entries })
     }
 }

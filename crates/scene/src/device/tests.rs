@@ -4,7 +4,7 @@ use super::{
     ViewUniform,
     uniform::{instance_bytes, light_bytes, material_bytes, view_bytes},
 };
-use crate::{AlphaMode, Camera, Instance, LightKind, Material, PunctualLight, Sampler, Scene, TextureRef};
+use crate::{AlphaMode, Camera, Instance, LightKind, Material, PunctualLight, Scene, TextureRef};
 use glam::{DMat4, DVec3, DVec4, Vec2, Vec3};
 use std::collections::HashMap;
 
@@ -154,7 +154,14 @@ fn normals_go_by_the_inverse_transpose() {
     let mirrored = sheared * DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0));
     let mut scene = Scene::default();
     scene.nodes.origin = Some(DVec3::new(9.0, 0.0, 0.0));
-    let place = |matrix| Instance { mesh: 0, world_from_local: matrix, name: String::new(), area_light: None, node: None };
+    let place = |matrix| Instance {
+        mesh: 0,
+        world_from_local: matrix,
+        name: String::new(),
+        area_light: None,
+        node: None,
+        node_from_local: DMat4::IDENTITY,
+    };
     scene.instances =
         vec![place(sheared), place(mirrored), place(DMat4::from_scale(DVec3::new(1.0, 1.0, 0.0))), place(DMat4::from_scale(DVec3::ZERO))];
     let bytes = instance_bytes(&scene);
@@ -201,7 +208,7 @@ fn materials_are_laid_out_as_shaders_read_them() {
     assert_eq!(layout.floats(&bytes, "specular"), [0.9]);
     // Neither map nor mask.
     assert_eq!((layout.floats(&bytes, "normal_scale"), layout.floats(&bytes, "alpha_cutoff")), ([0.0], [0.0]));
-    material.normal_texture = Some(TextureRef { texture: 0, sampler: Sampler::default() });
+    material.normal_texture = Some(TextureRef::default());
     material.alpha_mode = AlphaMode::Mask { cutoff: 0.75 };
     let bytes = material_bytes(&material, 1.0);
     assert_eq!((layout.floats(&bytes, "normal_scale"), layout.floats(&bytes, "alpha_cutoff")), ([1.5], [0.75]));

@@ -1,6 +1,6 @@
 //! What shaders read, laid out as `shaders/lobelia/scene.wgsl` says.
 
-use crate::{AlphaMode, AreaShape, Camera, LightKind, Material, Scene};
+use crate::{AlphaMode, AreaShape, Camera, LightKind, Material, Scene, TextureRef, UvSet};
 use encase::{ShaderType, StorageBuffer, UniformBuffer};
 use glam::{DMat3, DMat4, DVec3, DVec4, Mat4, Vec2, Vec3, Vec4};
 
@@ -121,6 +121,21 @@ pub(super) struct MaterialUniform {
     normal_scale: f32,
     alpha_cutoff: f32,
     flags: u32,
+    dielectric: Vec4,
+}
+
+#[derive(Clone, Copy, Debug, ShaderType)]
+struct TextureTransformUniform {
+    u_row: Vec4,
+    v_row: Vec4,
+}
+
+#[derive(Clone, Copy, Debug, ShaderType)]
+pub(super) struct TextureTransformsUniform {
+    base_color: TextureTransformUniform,
+    metallic_roughness: TextureTransformUniform,
+    normal: TextureTransformUniform,
+    emissive: TextureTransformUniform,
 }
 
 pub(super) fn light_bytes(scene: &Scene, pre_exposure: f32) -> Vec<u8> {
@@ -253,7 +268,8 @@ pub(super) fn material_bytes(material: &Material, pre_exposure: f32) -> Vec<u8> 
     uniform_bytes(&MaterialUniform {
         base_color: material.base_color,
         metallic: material.metallic,
-        emissive: material.emissive * pre_exposure,
+        // What reflects nothing shows its base colour in the same units.
+        emissive: if material.unlit { Vec3::splat(pre_exposure) } else { material.emissive * pre_exposure },
         roughness: material.roughness,
         specular: material.specular,
         normal_scale: if material.normal_texture.is_some() { material.normal_scale } else { 0.0 },
@@ -261,8 +277,20 @@ pub(super) fn material_bytes(material: &Material, pre_exposure: f32) -> Vec<u8> 
             AlphaMode::Opaque => 0.0,
             AlphaMode::Mask { cutoff } => cutoff,
         },
-        flags: u32::from(material.emits_both_ways),
+        flags: u32::from(material.emits_both_ways) | u32::from(material.unlit) << 1,
+        dielectric: material.dielectric,
     })
+}
+
+/// Where each texture of a material is read; the identity for those that it lacks.
+pub(super) fn texture_transform_bytes(material: &Material) -> Vec<u8> {
+    let [base_color, metallic_roughness, normal, emissive] = material.textures().map(|texture| {
+        let TextureRef { uv_set, uv_transform: from, .. } = texture.unwrap_or_default();
+        let (x, y, offset) = (from.matrix2.x_axis, from.matrix2.y_axis, from.translation);
+        let set = if uv_set == UvSet::Second { 1.0 } else { 0.0 };
+        TextureTransformUniform { u_row: Vec4::new(x.x, y.x, offset.x, set), v_row: Vec4::new(x.y, y.y, offset.y, 0.0) }
+    });
+    uniform_bytes(&TextureTransformsUniform { base_color, metallic_roughness, normal, emissive })
 }
 
 fn uniform_bytes<T: ShaderType + encase::internal::WriteInto>(value: &T) -> Vec<u8> {

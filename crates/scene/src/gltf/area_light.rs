@@ -86,6 +86,7 @@ pub(crate) fn add_surface(scene: &mut Scene, index: usize) {
         name: light.name,
         area_light: Some(index),
         node: light.node,
+        node_from_local: DMat4::IDENTITY,
     });
 }
 

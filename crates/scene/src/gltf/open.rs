@@ -21,7 +21,10 @@ pub(crate) fn open(bytes: &[u8], shown: &str) -> Result<gltf::Gltf, SceneError> 
         gltf::Gltf::from_slice_without_validation(bytes).map_err(|error| fail(format!("not a valid glTF 2.0 file: {error}")))?;
     check_required_extensions(unchecked.document.as_json()).map_err(fail)?;
     check_what_validation_trusts(unchecked.document.as_json()).map_err(fail)?;
-    let document = gltf::Document::from_json(unchecked.document.into_json()).map_err(|error| fail(explain(&error)))?;
+    let mut root = unchecked.document.into_json();
+    // What is required has been looked at; the validation knows fewer extensions.
+    root.extensions_required.clear();
+    let document = gltf::Document::from_json(root).map_err(|error| fail(explain(&error)))?;
     Ok(gltf::Gltf { document, blob: unchecked.blob })
 }
 
@@ -38,11 +41,11 @@ fn check_glb_length(bytes: &[u8]) -> Result<(), String> {
 
 fn check_required_extensions(root: &Root) -> Result<(), String> {
     let unknown: Vec<&str> =
-        root.extensions_required.iter().map(String::as_str).filter(|name| !super::KNOWN_EXTENSIONS.contains(name)).collect();
+        root.extensions_required.iter().map(String::as_str).filter(|name| !super::extensions::is_known(name)).collect();
     if unknown.is_empty() {
         return Ok(());
     }
-    let known = super::KNOWN_EXTENSIONS.join(" and ");
+    let known = super::extensions::known().join(", ");
     Err(format!("it requires {}, which this program cannot read; of extensions it reads {known}", unknown.join(", ")))
 }
 

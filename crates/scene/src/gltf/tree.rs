@@ -3,7 +3,7 @@
 use super::Loader;
 use crate::{
     SceneError,
-    animation::{Channel, Interpolation, Property},
+    animation::{Channel, Interpolation, Property, WeightChannel},
     nodes::{Node, NodeTree, Transform},
 };
 use glam::{DMat4, DQuat, DVec3, DVec4};
@@ -13,8 +13,9 @@ use std::collections::HashMap;
 const MAX_NODES: usize = 1_000_000;
 
 impl Loader<'_> {
-    /// Builds the node tree and returns the glTF index of each of its nodes, parents first.
-    pub(super) fn nodes(&mut self, gltf: &gltf::Gltf) -> Result<Vec<usize>, SceneError> {
+    /// Builds the node tree; returns the glTF index of each of its nodes, parents first, and how many of them belong to the scene. The rest holds joints
+    /// that the scene lacks.
+    pub(super) fn nodes(&mut self, gltf: &gltf::Gltf) -> Result<(Vec<usize>, usize), SceneError> {
         let count = gltf.nodes().len();
         if count > MAX_NODES {
             return Err(self.fail(format!("{count} nodes; at most {MAX_NODES} are read")));
@@ -45,7 +46,19 @@ impl Loader<'_> {
         let mut tree = NodeTree::default();
         let mut open: Vec<(usize, Option<usize>)> = roots.into_iter().rev().map(|root| (root, None)).collect();
         let mut placed = vec![false; count];
-        while let Some((index, parent)) = open.pop() {
+        let mut in_scene = None;
+        let mut joints = gltf.skins().flat_map(|skin| skin.joints().map(|joint| joint.index()).collect::<Vec<_>>());
+        loop {
+            let Some((index, parent)) = open.pop() else {
+                in_scene = in_scene.or(Some(order.len()));
+                // Joints need not be in the scene that is drawn; the trees that hold them move them all the same.
+                let Some(mut root) = joints.find(|joint| !placed[*joint]) else { break };
+                while let Some(parent) = parents[root] {
+                    root = parent;
+                }
+                open.push((root, None));
+                continue;
+            };
             if std::mem::replace(&mut placed[index], true) {
                 return Err(self.fail(format!("node {index}: it is listed twice as a root")));
             }
@@ -60,7 +73,8 @@ impl Loader<'_> {
             return Err(self.fail(format!("node {}: it and the nodes above it put it beyond the range of floats", order[place])));
         }
         self.scene.nodes = tree;
-        Ok(order)
+        let in_scene = in_scene.unwrap_or(order.len());
+        Ok((order, in_scene))
     }
 
     fn refuse_cycles(&self, parents: &[Option<usize>]) -> Result<(), SceneError> {
@@ -110,12 +124,17 @@ impl Loader<'_> {
         }
     }
 
-    pub(super) fn animations(&mut self, gltf: &gltf::Gltf, order: &[usize]) -> Result<(), SceneError> {
-        let place: HashMap<usize, usize> = order.iter().enumerate().map(|(place, node)| (*node, place)).collect();
+    /// Reads all animations. `place` gives the place in the node tree of a node of the file.
+    pub(super) fn animations(&mut self, gltf: &gltf::Gltf, place: &HashMap<usize, usize>) -> Result<(), SceneError> {
         for animation in gltf.animations() {
             for (index, channel) in animation.channels().enumerate() {
                 let Some(node) = place.get(&channel.target().node().index()) else { continue };
                 let at = format!("animation {}, channel {index}", animation.index());
+                if channel.target().property() == gltf::animation::Property::MorphTargetWeights {
+                    let channel = self.weight_channel(&channel, *node, &at)?;
+                    self.scene.nodes.weight_channels.extend(channel);
+                    continue;
+                }
                 if let Some(channel) = self.channel(&channel, *node, &at)? {
                     self.scene.nodes.channels.push(channel);
                 }
@@ -129,29 +148,18 @@ impl Loader<'_> {
             gltf::animation::Property::Translation => Property::Translation,
             gltf::animation::Property::Rotation => Property::Rotation,
             gltf::animation::Property::Scale => Property::Scale,
-            gltf::animation::Property::MorphTargetWeights => {
-                self.warn("morph targets are ignored");
-                return Ok(None);
-            }
+            gltf::animation::Property::MorphTargetWeights => return Ok(None),
         };
         if matches!(self.scene.nodes.nodes[node].rest, Transform::Matrix(_)) {
             return Err(self.fail(format!("{at}: it animates a node that has a matrix")));
         }
         let sampler = channel.sampler();
-        let times = self.buffers.floats(self.shown, &sampler.input(), 1)?;
         let width = if property == Property::Rotation { 4 } else { 3 };
         let numbers = self.buffers.floats(self.shown, &sampler.output(), width)?;
-        let interpolation = match sampler.interpolation() {
-            gltf::animation::Interpolation::Step => Interpolation::Step,
-            gltf::animation::Interpolation::Linear => Interpolation::Linear,
-            gltf::animation::Interpolation::CubicSpline => Interpolation::CubicSpline,
-        };
-        let per_key = if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
-        if times.is_empty() || numbers.len() != times.len() * width * per_key {
+        let (times, interpolation) = self.keys(&sampler, &numbers, at)?;
+        let per_key = per_key(interpolation);
+        if numbers.len() != times.len() * width * per_key {
             return Err(self.fail(format!("{at}: {} keys do not go with {} values", times.len(), numbers.len() / width)));
-        }
-        if times.iter().chain(&numbers).any(|number| !number.is_finite()) || times.windows(2).any(|pair| pair[0] >= pair[1]) {
-            return Err(self.fail(format!("{at}: key times must rise and all numbers be finite")));
         }
         let value = |numbers: &[f32]| {
             DVec4::new(numbers[0].into(), numbers[1].into(), numbers[2].into(), numbers.get(3).map_or(0.0, |w| f64::from(*w)))
@@ -164,4 +172,50 @@ impl Loader<'_> {
         }
         Ok(Some(Channel { node, property, interpolation, times, values }))
     }
+
+    /// Key times and interpolation of a sampler with `numbers` for its values.
+    fn keys(&self, sampler: &gltf::animation::Sampler<'_>, numbers: &[f32], at: &str) -> Result<(Vec<f32>, Interpolation), SceneError> {
+        let times = self.buffers.floats(self.shown, &sampler.input(), 1)?;
+        let interpolation = match sampler.interpolation() {
+            gltf::animation::Interpolation::Step => Interpolation::Step,
+            gltf::animation::Interpolation::Linear => Interpolation::Linear,
+            gltf::animation::Interpolation::CubicSpline => Interpolation::CubicSpline,
+        };
+        if times.is_empty() {
+            return Err(self.fail(format!("{at}: it has no keys")));
+        }
+        if times.iter().chain(numbers).any(|number| !number.is_finite()) || times.windows(2).any(|pair| pair[0] >= pair[1]) {
+            return Err(self.fail(format!("{at}: key times must rise and all numbers be finite")));
+        }
+        Ok((times, interpolation))
+    }
+
+    /// Weights of morph targets; `None` for a node that has none to weigh.
+    fn weight_channel(
+        &mut self,
+        channel: &gltf::animation::Channel<'_>,
+        node: usize,
+        at: &str,
+    ) -> Result<Option<WeightChannel>, SceneError> {
+        let mesh = channel.target().node().mesh();
+        let targets = mesh.and_then(|mesh| mesh.primitives().map(|primitive| primitive.morph_targets().len()).max()).unwrap_or(0);
+        if targets == 0 {
+            self.warn(format!("{at}: it animates morph targets of a node that has none"));
+            return Ok(None);
+        }
+        let sampler = channel.sampler();
+        let numbers = self.buffers.floats(self.shown, &sampler.output(), 1)?;
+        let (times, interpolation) = self.keys(&sampler, &numbers, at)?;
+        if numbers.len() != times.len() * targets * per_key(interpolation) {
+            let what = format!("{at}: {} keys of {targets} morph targets do not go with {} weights", times.len(), numbers.len());
+            return Err(self.fail(what));
+        }
+        let rows = numbers.chunks_exact(targets).map(|row| row.iter().map(|weight| f64::from(*weight)).collect()).collect();
+        Ok(Some(WeightChannel { node, interpolation, times, rows }))
+    }
+}
+
+/// How many values a key has.
+fn per_key(interpolation: Interpolation) -> usize {
+    if interpolation == Interpolation::CubicSpline { 3 } else { 1 }
 }

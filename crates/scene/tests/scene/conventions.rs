@@ -272,7 +272,7 @@ fn missing_tangents_follow_the_texture() {
 fn without_texture_coordinates_there_is_no_normal_map() {
     let (none, warnings) = tangents(None);
     assert!(none.iter().all(|tangent| *tangent == Vec4::ZERO));
-    assert!(warnings[0].contains("its normal map is ignored"), "{warnings:?}");
+    assert!(warnings.iter().any(|warning| warning.contains("its normal map is ignored")), "{warnings:?}");
     let (collapsed, _) = tangents(Some(&[0.5; 8]));
     assert!(collapsed.iter().all(|tangent| tangent.is_finite()), "{collapsed:?}");
 }
@@ -352,17 +352,6 @@ fn a_scene_ten_kilometres_away_is_as_precise() {
 #[test]
 fn an_unknown_optional_extension_is_a_warning() {
     let mut glb = Glb::triangle();
-    glb.json["extensionsUsed"] = json!(["KHR_texture_transform", "KHR_lights_punctual"]);
-    assert_eq!(glb.load().unwrap().warnings, ["extensions KHR_texture_transform are ignored"]);
-}
-
-#[test]
-fn vertex_colours_and_skins_are_ignored_aloud() {
-    let mut glb = Glb::triangle();
-    let colors = glb.floats("VEC3", &[1.0; 9]);
-    glb.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(colors);
-    glb.json["skins"] = json!([{"joints": [0]}]);
-    let warnings = glb.load().unwrap().warnings;
-    assert!(warnings.iter().any(|warning| warning == "vertex colours are ignored"), "{warnings:?}");
-    assert!(warnings.iter().any(|warning| warning.starts_with("skins are ignored")), "{warnings:?}");
+    glb.json["extensionsUsed"] = json!(["EXT_nobody_knows", "KHR_texture_transform", "KHR_lights_punctual"]);
+    assert_eq!(glb.load().unwrap().warnings, ["extensions EXT_nobody_knows are ignored"]);
 }

@@ -24,9 +24,35 @@ fn rich() -> Glb {
     glb.node(json!({"children": [lamp, eye], "matrix": [2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0, 0, 0, 7, 1]}));
     glb.node(json!({"camera": 1, "extras": {"area_light": {"shape": "quad", "width": 1, "height": 2, "radiance": [1, 1, 1]}}}));
     glb.animate(0, "translation", "LINEAR", &[0.0, 1.0], &[0., 0., 0., 8., 0., 4.]);
+    move_it(&mut glb, lamp);
     glb.animate(lamp, "rotation", "STEP", &[0.0, 1.0], &[0., 0., 0., 1., 0., 1., 0., 0.]);
     glb.json["buffers"][0]["byteLength"] = json!(glb.bin.len());
     glb
+}
+
+/// Joints, morph targets, instances, colours and transforms of textures.
+fn move_it(glb: &mut Glb, joint: usize) {
+    let joints = glb.joints(&[0, 1, 0, 1].repeat(4));
+    let weights = glb.floats("VEC4", &[0.5, 0.5, 0., 0.].repeat(4));
+    let colors = glb.floats("VEC3", &[0.5; 12]);
+    let second = glb.floats("VEC2", &[0.5; 8]);
+    for (name, accessor) in [("JOINTS_0", joints), ("WEIGHTS_0", weights), ("COLOR_0", colors), ("TEXCOORD_1", second)] {
+        glb.attribute(name, accessor);
+    }
+    let lift = glb.floats("VEC3", &[0., 0., 1.].repeat(4));
+    glb.json["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": lift, "NORMAL": lift}]);
+    glb.json["meshes"][0]["weights"] = json!([0.5]);
+    let identity = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
+    let matrices = glb.matrices(&identity.repeat(2));
+    let skin = glb.push("skins", json!({"joints": [joint, 0], "inverseBindMatrices": matrices}));
+    let places = glb.floats("VEC3", &[0., 0., 0., 1., 2., 3.]);
+    let instancing = json!({"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": places}}});
+    let skinned = glb.node(json!({"mesh": 0, "skin": skin, "weights": [1.0]}));
+    glb.node(json!({"mesh": 0, "extensions": instancing}));
+    glb.animate(skinned, "weights", "LINEAR", &[0.0, 1.0], &[0.0, 1.0]);
+    let transform = json!({"KHR_texture_transform": {"offset": [0.5, 0], "rotation": 1.0, "scale": [2, 2], "texCoord": 1}});
+    glb.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] = transform;
+    glb.json["materials"][0]["extensions"]["KHR_materials_ior"] = json!({"ior": 1.3});
 }
 
 /// Everything that a loaded scene is asked for.
@@ -37,6 +63,7 @@ fn use_it(mut scene: Scene) {
         assert!(camera.is_ok_and(|camera| camera.position.is_finite() && camera.forward.is_finite() && camera.up.is_finite()));
         assert!(scene.lights.iter().all(|light| light.position.is_finite() && (light.direction.length() - 1.0).abs() < 1e-6));
         assert!(!scene.triangles().is_empty());
+        assert!(scene.bounds().is_finite());
         assert!(scene.meshes.iter().all(|mesh| mesh.tangents.iter().all(|tangent| tangent.is_finite())));
         assert!(!scene.traits().facts().is_empty());
     }
@@ -46,6 +73,7 @@ fn use_it(mut scene: Scene) {
 fn undamaged_it_loads() {
     let scene = rich().load().unwrap();
     let traits = scene.traits();
+    assert!(traits.vertex_colors && traits.second_uvs && traits.texture_transforms && traits.dielectric && traits.triangles > 8);
     assert!(traits.animated && traits.alpha_mask && traits.normal_maps && traits.quad_lights == 1 && traits.spot_lights == 1);
     use_it(scene);
 }

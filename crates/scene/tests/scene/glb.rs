@@ -108,6 +108,23 @@ impl Glb {
         self.push("accessors", json!({"bufferView": view, "componentType": 5123, "count": numbers.len(), "type": "SCALAR"}))
     }
 
+    /// One row of four joints for each vertex.
+    pub fn joints(&mut self, numbers: &[u8]) -> usize {
+        let view = self.view(numbers);
+        self.push("accessors", json!({"bufferView": view, "componentType": 5121, "count": numbers.len() / 4, "type": "VEC4"}))
+    }
+
+    /// Column-major matrices.
+    pub fn matrices(&mut self, numbers: &[f32]) -> usize {
+        let view = self.view(&numbers.iter().flat_map(|number| number.to_le_bytes()).collect::<Vec<u8>>());
+        self.push("accessors", json!({"bufferView": view, "componentType": 5126, "count": numbers.len() / 16, "type": "MAT4"}))
+    }
+
+    /// Sets an attribute of the first primitive.
+    pub fn attribute(&mut self, name: &str, accessor: usize) {
+        self.json["meshes"][0]["primitives"][0]["attributes"][name] = json!(accessor);
+    }
+
     /// An image with a texture and a sampler of its own; returns the texture.
     pub fn texture(&mut self, png: &[u8], sampler: Value) -> usize {
         let view = self.view(png);
@@ -118,7 +135,11 @@ impl Glb {
 
     /// Animates a node.
     pub fn animate(&mut self, node: usize, path: &str, interpolation: &str, times: &[f32], values: &[f32]) {
-        let kind = if path == "rotation" { "VEC4" } else { "VEC3" };
+        let kind = match path {
+            "rotation" => "VEC4",
+            "weights" => "SCALAR",
+            _ => "VEC3",
+        };
         let (input, output) = (self.floats("SCALAR", times), self.floats(kind, values));
         self.push(
             "animations",

@@ -8,5 +8,8 @@ mod conventions;
 mod fuzz;
 mod glb;
 mod hostile;
+mod instancing;
+mod materials;
+mod posing;
 mod ron;
 mod shared;
