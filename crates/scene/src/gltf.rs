@@ -1,24 +1,26 @@
 //! Reading glTF 2.0.
 //!
-//! The `gltf` crate parses and validates the JSON; everything that touches bytes is checked here against what is really there before anything is
-//! allocated, so that a hostile file ends in a message.
+//! The `gltf` crate holds the document of what is drawn; everything that touches bytes is checked here against what is really there before anything is
+//! allocated, so that a hostile file ends in a message. Buffers and images are read when something asks for them.
 
 mod accessor;
 pub(crate) mod area_light;
+mod compressed;
+mod extensions;
 mod image;
 mod open;
 mod primitive;
+mod reach;
+mod round;
 mod tree;
 
-use crate::{AlphaMode, Camera, Instance, LightKind, Material, Mesh, PunctualLight, Sampler, Scene, SceneError, TextureRef, Wrap, files};
+use crate::{AlphaMode, Camera, Instance, LightKind, LoadOptions, Material, Mesh, PunctualLight, Sampler, Scene, SceneError, TextureRef, Wrap};
 use accessor::Buffers;
 use base64::Engine;
 use glam::{DMat4, DVec3, Vec3};
 use gltf::khr_lights_punctual::Kind;
+use image::Images;
 use std::{collections::HashMap, path::Path, sync::Arc};
-
-/// The extensions that are read.
-const KNOWN_EXTENSIONS: [&str; 2] = ["KHR_lights_punctual", "KHR_materials_emissive_strength"];
 
 /// Most vertices and most triangles that all meshes together may have. A file can use the same numbers many times over, so its own size is no bound.
 const MAX_MESH_ELEMENTS: usize = 1 << 24;
@@ -27,20 +29,30 @@ const MAX_MESH_ELEMENTS: usize = 1 << 24;
 const MAX_AREA_LIGHTS: usize = 4096;
 
 /// Loads a `.glb` or `.gltf` file.
-pub(crate) fn load(path: &Path) -> Result<Scene, SceneError> {
+pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
     let shown = path.display().to_string();
-    let bytes = files::read(path).map_err(|reason| SceneError::Unreadable { file: shown.clone(), reason })?;
-    parse(&bytes, &shown, path.parent())
+    let bytes = lobelia_files::read(path).map_err(|reason| SceneError::Unreadable { file: shown.clone(), reason })?;
+    parse(&bytes, &shown, path.parent(), options)
 }
 
 /// Reads a file's bytes; `folder` is where its external files lie.
-pub(crate) fn parse(bytes: &[u8], shown: &str, folder: Option<&Path>) -> Result<Scene, SceneError> {
-    let mut gltf = open::open(bytes, shown)?;
-    let buffers = Buffers::load(&mut gltf, shown, folder)?;
-    let mut loader =
-        Loader { shown, scene: Scene::default(), buffers, primitives: HashMap::new(), meshes: Vec::new(), mesh_elements: 0, dropped: None };
-    loader.extensions(&gltf);
-    loader.scene.textures = Arc::new(image::load(&gltf, &loader.buffers, shown, folder)?);
+pub(crate) fn parse(bytes: &[u8], shown: &str, folder: Option<&Path>, options: &LoadOptions) -> Result<Scene, SceneError> {
+    let open::Opened { gltf, blob, raw, warnings } = open::open(bytes, shown, options.allow_unsupported)?;
+    let mut loader = Loader {
+        shown,
+        scene: Scene::default(),
+        buffers: Buffers::new(raw, blob, folder),
+        images: Images::new(folder),
+        allow_unsupported: options.allow_unsupported,
+        primitives: HashMap::new(),
+        meshes: Vec::new(),
+        mesh_elements: 0,
+        dropped: None,
+    };
+    warnings.into_iter().for_each(|warning| loader.warn(warning));
+    if gltf.skins().any(|skin| skin.joints().len() > 0) {
+        loader.warn("skins are ignored: meshes stand in their rest pose");
+    }
     loader.materials(&gltf)?;
     let order = loader.nodes(&gltf)?;
     loader.animations(&gltf, &order)?;
@@ -48,7 +60,11 @@ pub(crate) fn parse(bytes: &[u8], shown: &str, folder: Option<&Path>) -> Result<
     if let Some((count, at)) = loader.dropped.take() {
         loader.warn(format!("triangles without area are dropped: {count}, first in {at}"));
     }
-    let Loader { mut scene, meshes, .. } = loader;
+    for warning in loader.images.warnings.split_off(0).into_iter().chain(loader.buffers.take_warnings()).chain(loader.buffers.unread()) {
+        loader.warn(warning);
+    }
+    let Loader { mut scene, meshes, images, .. } = loader;
+    scene.textures = Arc::new(images.textures);
     scene.meshes = Arc::new(meshes);
     scene.place_nodes();
     for index in 0..scene.area_lights.len() {
@@ -67,8 +83,11 @@ fn read_uri(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>, String> {
             .decode(encoded)
             .map_err(|error| format!("a data URI with broken base64: {error}"));
     }
-    let path = folder.unwrap_or(Path::new(".")).join(percent_decoded(uri));
-    files::read(&path).map_err(|reason| format!("{}: cannot be read: {reason}", path.display()))
+    let folder = folder.unwrap_or(Path::new("."));
+    let decoded = folder.join(percent_decoded(uri));
+    // A name with a percent sign that nobody encoded.
+    let path = if decoded.exists() { decoded } else { Some(folder.join(uri)).filter(|plain| plain.exists()).unwrap_or(decoded) };
+    lobelia_files::read_raw(&path).map_err(|reason| format!("{}: {reason}", path.display()))
 }
 
 fn percent_decoded(uri: &str) -> String {
@@ -94,6 +113,8 @@ struct Loader<'a> {
     shown: &'a str,
     scene: Scene,
     buffers: Buffers,
+    images: Images,
+    allow_unsupported: bool,
     /// Mesh index of each glTF primitive that has been read; `None` for those that draw nothing.
     primitives: HashMap<(usize, usize), Option<usize>>,
     meshes: Vec<Mesh>,
@@ -115,16 +136,6 @@ impl Loader<'_> {
         }
     }
 
-    fn extensions(&mut self, gltf: &gltf::Gltf) {
-        let other: Vec<&str> = gltf.extensions_used().filter(|name| !KNOWN_EXTENSIONS.contains(name)).collect();
-        if !other.is_empty() {
-            self.warn(format!("extensions {} are ignored", other.join(", ")));
-        }
-        if gltf.skins().len() > 0 {
-            self.warn("skins are ignored: meshes stand in their rest pose");
-        }
-    }
-
     fn materials(&mut self, gltf: &gltf::Gltf) -> Result<(), SceneError> {
         for material in gltf.materials() {
             let read = self.material(&material)?;
@@ -139,9 +150,6 @@ impl Loader<'_> {
         let pbr = material.pbr_metallic_roughness();
         let name = material.name().map_or_else(|| format!("material {}", material.index().unwrap_or(0)), str::to_owned);
         let [red, green, blue, opacity] = pbr.base_color_factor();
-        if material.occlusion_texture().is_some() {
-            self.warn("occlusion textures are ignored: light is computed, not painted");
-        }
         let emissive = Vec3::from_array(material.emissive_factor()) * material.emissive_strength().unwrap_or(1.0);
         let read = Material {
             base_color: Vec3::new(red, green, blue),
@@ -149,10 +157,10 @@ impl Loader<'_> {
             roughness: pbr.roughness_factor(),
             emissive,
             normal_scale: material.normal_texture().map_or(1.0, |texture| texture.scale()),
-            base_color_texture: pbr.base_color_texture().map(|info| self.texture(&name, &info.texture(), info.tex_coord())),
-            metallic_roughness_texture: pbr.metallic_roughness_texture().map(|info| self.texture(&name, &info.texture(), info.tex_coord())),
-            normal_texture: material.normal_texture().map(|info| self.texture(&name, &info.texture(), info.tex_coord())),
-            emissive_texture: material.emissive_texture().map(|info| self.texture(&name, &info.texture(), info.tex_coord())),
+            base_color_texture: self.texture(&name, pbr.base_color_texture().map(|info| (info.texture(), info.tex_coord())))?,
+            metallic_roughness_texture: self.texture(&name, pbr.metallic_roughness_texture().map(|info| (info.texture(), info.tex_coord())))?,
+            normal_texture: self.texture(&name, material.normal_texture().map(|info| (info.texture(), info.tex_coord())))?,
+            emissive_texture: self.texture(&name, material.emissive_texture().map(|info| (info.texture(), info.tex_coord())))?,
             alpha_mode: match material.alpha_mode() {
                 gltf::material::AlphaMode::Opaque => AlphaMode::Opaque,
                 gltf::material::AlphaMode::Mask => {
@@ -189,7 +197,17 @@ impl Loader<'_> {
         Ok(read)
     }
 
-    fn texture(&mut self, material: &str, texture: &gltf::Texture<'_>, set: u32) -> TextureRef {
+    /// A texture and its set of coordinates. One whose image cannot be read is an error, or none where unsupported files are allowed.
+    fn texture(&mut self, material: &str, info: Option<(gltf::Texture<'_>, u32)>) -> Result<Option<TextureRef>, SceneError> {
+        let Some((texture, set)) = info else { return Ok(None) };
+        let image = match self.images.of_texture(&self.buffers, texture.index()) {
+            Ok(image) => image,
+            Err(message) if self.allow_unsupported => {
+                self.warn(format!("{message}; material `{material}` goes without it"));
+                return Ok(None);
+            }
+            Err(message) => return Err(self.fail(message)),
+        };
         if set != 0 {
             self.warn(format!("material `{material}` reads texture coordinates {set}; set 0 is used"));
         }
@@ -200,10 +218,8 @@ impl Loader<'_> {
         };
         let sampler = texture.sampler();
         let nearest = sampler.mag_filter() == Some(gltf::texture::MagFilter::Nearest);
-        TextureRef {
-            texture: texture.source().index(),
-            sampler: Sampler { wrap_u: wrap(sampler.wrap_s()), wrap_v: wrap(sampler.wrap_t()), nearest },
-        }
+        let sampler = Sampler { wrap_u: wrap(sampler.wrap_s()), wrap_v: wrap(sampler.wrap_t()), nearest };
+        Ok(Some(TextureRef { texture: image, sampler }))
     }
 
     /// Meshes, lights and cameras that hang on nodes.
@@ -335,7 +351,7 @@ pub(crate) fn check_light(kind: LightKind, intensity: Vec3) -> Result<(), String
         return Err(format!("its intensity is {intensity}, but must be finite and not negative"));
     }
     if let LightKind::Spot { inner, outer } = kind
-        && !(inner >= 0.0 && inner <= outer && outer > 0.0 && outer <= std::f32::consts::FRAC_PI_2 + 1e-6)
+        && !(inner >= 0.0 && inner <= outer && outer > 0.0 && outer <= std::f32::consts::FRAC_PI_2)
     {
         return Err(format!("its cone angles are {inner} and {outer}, but 0 <= inner <= outer <= pi/2 must hold"));
     }

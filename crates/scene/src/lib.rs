@@ -41,9 +41,9 @@ mod animation;
 mod builtin;
 mod camera;
 pub mod device;
+mod environment;
 mod error;
 mod exposure;
-mod files;
 mod gltf;
 mod light;
 mod material;
@@ -109,6 +109,14 @@ pub struct Scene {
     version: u64,
 }
 
+/// How a scene is loaded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LoadOptions {
+    /// Go on, with a word in [`Scene::warnings`], where a glTF file requires an extension that is not read or samples an image that cannot be: the
+    /// picture may be wrong then.
+    pub allow_unsupported: bool,
+}
+
 /// A mesh in the world.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Instance {
@@ -126,14 +134,19 @@ pub struct Instance {
 impl Scene {
     /// Loads `builtin:NAME`, a `.glb` or `.gltf` file, or a RON scene.
     pub fn load(address: &str) -> Result<Self, SceneError> {
+        Self::load_with(address, &LoadOptions::default())
+    }
+
+    /// As [`Scene::load`], with options.
+    pub fn load_with(address: &str, options: &LoadOptions) -> Result<Self, SceneError> {
         let mut scene = match address.strip_prefix("builtin:") {
             Some(name) => builtin::load(name)?,
             None => {
                 let path = std::path::Path::new(address);
                 let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase();
                 match ending.as_str() {
-                    "glb" | "gltf" => gltf::load(path)?,
-                    "ron" => wrapper::load(path)?,
+                    "glb" | "gltf" => gltf::load(path, options)?,
+                    "ron" => wrapper::load(path, options)?,
                     _ => return Err(SceneError::UnknownKind { file: address.into() }),
                 }
             }
