@@ -1,10 +1,11 @@
 //! Reading files as people have them.
 //!
 //! A file is not always what its name says: a clone without Git LFS holds pointers, a download ends early or is a server's error page, an editor puts
-//! a byte-order mark in front. [`stand_in`] knows what stands in a file's place, [`text`] reads text past a byte-order mark, and [`radiance`] reads
-//! pictures of light: which layer, which window, which primaries, which transfer.
+//! a byte-order mark in front. [`stand_in`] knows what stands in a file's place, [`text`] reads text past a byte-order mark, and `radiance`
+//! (a feature of that name) reads pictures of light: which layer, which window, which primaries, which transfer.
 
 mod kind;
+#[cfg(feature = "radiance")]
 pub mod radiance;
 mod text;
 

@@ -10,7 +10,7 @@
 //! (
 //!     gltf: "atrium.glb",                          // beside this file, or "builtin:cornell-glossy"
 //!     ndf: phong,                                  // ggx (default) or phong
-//!     environment: (file: "sky.hdr", scale: 0.5),  // .hdr or .exr
+//!     environment: (file: "sky.hdr", scale: 0.5),  // .hdr, .exr (a layer: "sky.exr#Sky"), or a picture, which has no range above 1
 //!     cameras: {                                   // added, or replacing one of that name; the first is the default
 //!         "close": (origin: (0, 1, 3), target: (0, 1, 0), up: (0, 1, 0), yfov: 0.7, near: 0.01),
 //!     },
@@ -34,8 +34,13 @@
 //! A glTF node with `extras.area_light` is a light with extent: `{"shape": "quad", "width", "height"}`, `{"shape": "disk", "radius"}` or
 //! `{"shape": "sphere", "radius"}`, each with `"radiance": [r, g, b]`; quad and disk emit towards local -Z.
 //!
+//! Of a glTF file only what the scene draws is read; what nothing reaches may be broken or absent. Meshes may be compressed
+//! (`KHR_draco_mesh_compression`, `EXT_meshopt_compression`), images may be PNG, JPEG, WebP or KTX2 of Basis Universal. A file that requires an extension
+//! which is not read is refused, unless [`LoadOptions::allow_unsupported`] is set.
+//!
 //! Not drawn as the file says, with a word in [`Scene::warnings`]: blended surfaces (opaque here), skins and morph targets, vertex colours, occlusion
-//! textures, points and lines, ranges of lights, texture coordinates other than set 0, and extensions that are not required.
+//! textures, points and lines, ranges of lights, texture coordinates other than set 0, and extensions that are not read. Numbers that are out of range by
+//! rounding, up to 0.001, are clamped with a word too, and so are pixels of an environment that are no radiance.
 
 mod animation;
 mod builtin;

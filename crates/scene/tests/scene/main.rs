@@ -10,3 +10,5 @@ mod glb;
 mod hostile;
 mod ron;
 mod shared;
+mod compressed;
+mod usable;
