@@ -632,7 +632,8 @@ fn good_input_is_good() {
     std::fs::write(folder.path().join("g.ron"), good).unwrap();
     std::fs::write(folder.path().join("marked.ron"), ["\u{feff}", &graph(GOOD)].concat()).unwrap();
     std::fs::write(folder.path().join("unlit.gltf"), UNLIT).unwrap();
-    std::fs::write(folder.path().join("clay.gltf"), UNLIT.replace("\"scenes\"", "\"extensionsRequired\":[\"ACME_clay\"],\"scenes\"")).unwrap();
+    std::fs::write(folder.path().join("clay.gltf"), UNLIT.replace("\"scenes\"", "\"extensionsRequired\":[\"ACME_clay\"],\"scenes\""))
+        .unwrap();
     for arguments in [
         "check g.ron GRAPHS/direct.ron GRAPHS/indirect.ron --scene builtin:spheres",
         "explain g.ron --variant v --set lights.count=32 --set indirect.clamp=none --time -1",

@@ -18,7 +18,8 @@ pub(crate) fn placeholder(bytes: &[u8]) -> Option<String> {
     }
     let bytes = without_mark(bytes);
     let head = &bytes[..bytes.len().min(1024)];
-    const POINTERS: [&[u8]; 3] = [b"version https://git-lfs.github.com/spec/", b"version https://hawser.github.com/spec/", b"version http://git-media.io/v/"];
+    const POINTERS: [&[u8]; 3] =
+        [b"version https://git-lfs.github.com/spec/", b"version https://hawser.github.com/spec/", b"version http://git-media.io/v/"];
     if POINTERS.iter().any(|start| head.starts_with(start)) {
         let text = String::from_utf8_lossy(head);
         let size = text.lines().find_map(|line| line.strip_prefix("size ")).and_then(|size| size.trim().parse::<u64>().ok());
@@ -30,7 +31,9 @@ pub(crate) fn placeholder(bytes: &[u8]) -> Option<String> {
         return Some("it is a git-annex pointer, not the data; `git annex get` fetches it".into());
     }
     if [b"<!doctype html".as_slice(), b"<html", b"<head", b"<body"].iter().any(|start| lower.starts_with(start)) {
-        return Some("it is a web page (HTML), not the data: a download that failed, or the page about the file instead of the file".into());
+        return Some(
+            "it is a web page (HTML), not the data: a download that failed, or the page about the file instead of the file".into(),
+        );
     }
     if [b"<?xml".as_slice(), b"<error", b"<svg", b"<!doctype", b"<!--"].iter().any(|start| lower.starts_with(start)) {
         return Some("it is an XML document, not the data: perhaps a server's error message".into());

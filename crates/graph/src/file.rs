@@ -3,8 +3,8 @@
 //! The file is read in layers. Each layer takes apart one level of the text and keeps what is inside as raw RON, so that every name and value
 //! still knows its place when a later stage finds fault with it.
 
-use lobelia_files::NoText;
 use crate::problem::{Problem, Problems, position};
+use lobelia_files::NoText;
 use ron::value::RawValue;
 use serde::{
     Deserialize, Deserializer,

@@ -183,7 +183,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("layers.exr");
         let channels = ["Beauty.R", "Beauty.G", "Beauty.B", "Albedo.R", "Albedo.G", "Albedo.B"];
-        let list = channels.iter().zip(1..).map(|(name, value)| files::AnyChannel::new(*name, files::FlatSamples::F32(vec![value as f32; 2])));
+        let list =
+            channels.iter().zip(1..).map(|(name, value)| files::AnyChannel::new(*name, files::FlatSamples::F32(vec![value as f32; 2])));
         let channels = files::AnyChannels::sort(list.collect());
         files::Image::from_channels((2, 1), channels).write().to_file(&path).unwrap();
         let read = |layer: &str| read_exr(&folder.path().join(format!("layers.exr{layer}")));

@@ -14,7 +14,9 @@ mod reach;
 mod round;
 mod tree;
 
-use crate::{AlphaMode, Camera, Instance, LightKind, LoadOptions, Material, Mesh, PunctualLight, Sampler, Scene, SceneError, TextureRef, Wrap};
+use crate::{
+    AlphaMode, Camera, Instance, LightKind, LoadOptions, Material, Mesh, PunctualLight, Sampler, Scene, SceneError, TextureRef, Wrap,
+};
 use accessor::Buffers;
 use base64::Engine;
 use glam::{DMat4, DVec3, Vec3};
@@ -158,7 +160,8 @@ impl Loader<'_> {
             emissive,
             normal_scale: material.normal_texture().map_or(1.0, |texture| texture.scale()),
             base_color_texture: self.texture(&name, pbr.base_color_texture().map(|info| (info.texture(), info.tex_coord())))?,
-            metallic_roughness_texture: self.texture(&name, pbr.metallic_roughness_texture().map(|info| (info.texture(), info.tex_coord())))?,
+            metallic_roughness_texture: self
+                .texture(&name, pbr.metallic_roughness_texture().map(|info| (info.texture(), info.tex_coord())))?,
             normal_texture: self.texture(&name, material.normal_texture().map(|info| (info.texture(), info.tex_coord())))?,
             emissive_texture: self.texture(&name, material.emissive_texture().map(|info| (info.texture(), info.tex_coord())))?,
             alpha_mode: match material.alpha_mode() {

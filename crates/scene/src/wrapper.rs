@@ -3,7 +3,9 @@
 mod motion;
 mod position;
 
-use crate::{Camera, LightKind, LoadOptions, Ndf, PunctualLight, Scene, SceneError, environment, error::suggestion, gltf::check_light, light};
+use crate::{
+    Camera, LightKind, LoadOptions, Ndf, PunctualLight, Scene, SceneError, environment, error::suggestion, gltf::check_light, light,
+};
 use glam::{DVec3, Vec3};
 use position::Step::{self, Field, Quoted};
 use serde::{Deserialize, Deserializer, de::MapAccess};
@@ -203,7 +205,8 @@ pub(crate) fn parse(text: &str, shown: &str, folder: &Path, load: &LoadOptions) 
         scene.ndf = ndf;
     }
     if let Some(environment) = &written.environment {
-        let fail = |field: &str, message: String| file.about(&[Field("environment"), Field(field)], format!("environment: {message}"), None);
+        let fail =
+            |field: &str, message: String| file.about(&[Field("environment"), Field(field)], format!("environment: {message}"), None);
         let scale = environment.scale;
         if !(scale.is_finite() && scale >= 0.0) {
             return Err(fail("scale", format!("scale is {scale}, but must be finite and not negative")));
@@ -262,7 +265,9 @@ fn add_lights(file: &File<'_>, scene: &mut Scene, lights: &Ordered<WrittenLight>
             WrittenLight::Spot { position, direction, intensity, inner, outer } => {
                 let rounded = light::rounded_cone(inner.into(), outer.into());
                 if rounded != (inner.into(), outer.into()) {
-                    scene.warnings.push(format!("light `{name}`: cone angles of {inner} and {outer} are clamped to {} and {}", rounded.0, rounded.1));
+                    scene
+                        .warnings
+                        .push(format!("light `{name}`: cone angles of {inner} and {outer} are clamped to {} and {}", rounded.0, rounded.1));
                 }
                 let kind = LightKind::Spot { inner: rounded.0 as f32, outer: rounded.1 as f32 };
                 (kind, entry.point("position", position)?, entry.direction("direction", direction)?, intensity)

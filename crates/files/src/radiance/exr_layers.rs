@@ -123,7 +123,11 @@ fn sort(parts: &[(Option<String>, Vec<String>)]) -> Result<Layers, String> {
             let name = match part_name.as_deref().filter(|name| !name.is_empty() && parts.len() > 1) {
                 Some(part) if prefix.is_empty() => part.to_owned(),
                 Some(part) if prefix == part || prefix.starts_with(&format!("{part}.")) || part.ends_with(&format!(".{prefix}")) => {
-                    if prefix.len() > part.len() { prefix.to_owned() } else { part.to_owned() }
+                    if prefix.len() > part.len() {
+                        prefix.to_owned()
+                    } else {
+                        part.to_owned()
+                    }
                 }
                 Some(part) => format!("{part}.{prefix}"),
                 None => prefix.to_owned(),
@@ -186,7 +190,8 @@ fn choose(layers: &Layers, wanted: Option<&str>) -> Result<(Layer, Option<String
                 _ => return Err(format!("several of its layers could be `{wanted}`: {}; give the whole name", layers.list())),
             }
         }
-        let near = all.iter().map(|layer| (strsim::jaro_winkler(&lower, &layer.name.to_lowercase()), layer)).filter(|(score, _)| *score > 0.75);
+        let near =
+            all.iter().map(|layer| (strsim::jaro_winkler(&lower, &layer.name.to_lowercase()), layer)).filter(|(score, _)| *score > 0.75);
         let near = near.max_by(|left, right| left.0.total_cmp(&right.0)).map(|(_, layer)| format!("; did you mean `{}`?", layer.name));
         return Err(format!("it has no layer `{wanted}` that is a picture: {}{}", layers.list(), near.unwrap_or_default()));
     }
@@ -220,8 +225,8 @@ mod tests {
     use super::*;
     use exr::meta::attribute::Chromaticities;
     use exr::prelude::{
-        AnyChannel, AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer as Written, LayerAttributes,
-        Vec2, WritableImage as _,
+        AnyChannel, AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer as Written, LayerAttributes, Vec2,
+        WritableImage as _,
     };
 
     /// A part with channels of one value each, of 2 x 1 pixels at a place.
@@ -270,7 +275,10 @@ mod tests {
         assert!(reads(&one_part(&[("", 1.0), ("Diffuse.", 4.0)], &[]), None, 1.0).is_empty());
         assert!(reads(&one_part(&[("Beauty.", 3.0)], &[]), None, 3.0).is_empty());
         // Blender's, beside depth and normals.
-        let blender = one_part(&[("ViewLayer.Combined.", 2.0)], &["ViewLayer.Combined.A", "ViewLayer.Depth.Z", "ViewLayer.Normal.X", "ViewLayer.Normal.Y"]);
+        let blender = one_part(
+            &[("ViewLayer.Combined.", 2.0)],
+            &["ViewLayer.Combined.A", "ViewLayer.Depth.Z", "ViewLayer.Normal.X", "ViewLayer.Normal.Y"],
+        );
         assert!(reads(&blender, None, 2.0).is_empty());
         let passes = one_part(&[("ViewLayer.Combined.", 2.0), ("ViewLayer.DiffCol.", 5.0)], &["ViewLayer.Depth.Z"]);
         let notes = reads(&passes, None, 2.0);
@@ -285,7 +293,10 @@ mod tests {
         }
         let refused = |layer: Option<&str>| decode(&bytes, layer).unwrap_err();
         let message = refused(None);
-        assert!(message.contains("several pictures") && message.contains("`Key`, `Fill`, `View.Rim`") || message.contains("`Fill`"), "{message}");
+        assert!(
+            message.contains("several pictures") && message.contains("`Key`, `Fill`, `View.Rim`") || message.contains("`Fill`"),
+            "{message}"
+        );
         assert!(message.contains("`Depth` (Z)"), "{message}");
         let message = refused(Some("Fil"));
         assert!(message.contains("no layer `Fil`") && message.contains("did you mean `Fill`?") && message.contains("`Key`"), "{message}");
@@ -326,7 +337,9 @@ mod tests {
     fn the_picture_is_the_display_window() {
         let channels = rgb("", 1.0);
         let channels: Vec<(&str, FlatSamples)> = channels.iter().map(|(name, samples)| (name.as_str(), samples.clone())).collect();
-        let at = |x: i32, y: i32, window: IntegerBounds| file(vec![part(None, &channels, (x, y))], |attributes| attributes.display_window = window);
+        let at = |x: i32, y: i32, window: IntegerBounds| {
+            file(vec![part(None, &channels, (x, y))], |attributes| attributes.display_window = window)
+        };
         let (zero, left, right) = ([0.0; 3], [1.0, 2.0, 3.0], [1.5, 2.5, 3.5]);
         // Smaller than the window, and elsewhere.
         let picture = decode(&at(1, 1, IntegerBounds::new((0, 0), (4, 2))), None).unwrap();

@@ -93,7 +93,8 @@ mod tests {
     fn primaries_are_converted() {
         // Rec. 2020, whose red lies outside of Rec. 709's.
         let (pixel, notes) = first("FORMAT=32-bit_rle_rgbe\nPRIMARIES= .708 .292 .170 .797 .131 .046 .3127 .3290\n");
-        let expected = [1.6605 - 0.5876 * 0.5 - 0.0728 * 0.25, -0.1246 + 1.1329 * 0.5 - 0.0083 * 0.25, -0.0182 - 0.1006 * 0.5 + 1.1187 * 0.25];
+        let expected =
+            [1.6605 - 0.5876 * 0.5 - 0.0728 * 0.25, -0.1246 + 1.1329 * 0.5 - 0.0083 * 0.25, -0.0182 - 0.1006 * 0.5 + 1.1187 * 0.25];
         assert!(pixel.iter().zip(expected).all(|(found, expected)| (f64::from(*found) - expected).abs() < 1e-3), "{pixel:?}");
         assert!(notes[0].contains("PRIMARIES are red (0.7080, 0.2920)"), "{notes:?}");
         let (pixel, notes) = first("FORMAT=32-bit_rle_xyze\n");

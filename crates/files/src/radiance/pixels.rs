@@ -119,7 +119,13 @@ mod tests {
             for x in 0..width {
                 let across = (x as f32 - 3.0).abs();
                 let distance = across.min(width as f32 - across).hypot(y as f32 - 90.0);
-                sun.pixels[y * width + x] = if distance < 60.0 { [INF; 3] } else if distance < 62.0 { [6e4, 5e4, 4e4] } else { [1.0; 3] };
+                sun.pixels[y * width + x] = if distance < 60.0 {
+                    [INF; 3]
+                } else if distance < 62.0 {
+                    [6e4, 5e4, 4e4]
+                } else {
+                    [1.0; 3]
+                };
             }
         }
         assert!(sun.mend().infinite > 9000);

@@ -54,7 +54,8 @@ impl Primaries {
         if self.is_rec709() {
             return Some(DMat3::IDENTITY);
         }
-        let bradford = DMat3::from_cols(DVec3::new(0.8951, -0.7502, 0.0389), DVec3::new(0.2664, 1.7135, -0.0685), DVec3::new(-0.1614, 0.0367, 1.0296));
+        let bradford =
+            DMat3::from_cols(DVec3::new(0.8951, -0.7502, 0.0389), DVec3::new(0.2664, 1.7135, -0.0685), DVec3::new(-0.1614, 0.0367, 1.0296));
         let cone = |white: [f64; 2]| bradford * (DVec3::new(white[0], white[1], 1.0 - white[0] - white[1]) / white[1]);
         let gain = cone(Self::REC709.white) / cone(self.white);
         let adapt = bradford.inverse() * DMat3::from_diagonal(gain) * bradford;

@@ -2,8 +2,8 @@
 
 use super::{
     compressed::{self, Packed},
-    read_uri,
     reach::Raw,
+    read_uri,
 };
 use crate::SceneError;
 use gltf::accessor::{
@@ -86,7 +86,8 @@ impl Buffers {
 
     /// The buffers and buffer views of which nothing was asked, in words; nothing if there are none.
     pub fn unread(&self) -> Option<String> {
-        let unread: Vec<String> = (0..self.buffers.len()).filter(|buffer| self.buffers[*buffer].get().is_none()).map(|buffer| buffer.to_string()).collect();
+        let unread: Vec<String> =
+            (0..self.buffers.len()).filter(|buffer| self.buffers[*buffer].get().is_none()).map(|buffer| buffer.to_string()).collect();
         (!unread.is_empty()).then(|| format!("buffers that nothing drawn uses are not read: {}", unread.join(", ")))
     }
 
@@ -213,7 +214,9 @@ impl Buffers {
                 starts.flat_map(|start| bytes[start..start + element].chunks_exact(component)).map(number).collect()
             }
             // What has no bytes is zero (glTF 2.0, section 3.6.2.3).
-            None if count > MAX_ZEROS => return Err(fail(format!("it has {count} elements and no buffer view; at most {MAX_ZEROS} are read"))),
+            None if count > MAX_ZEROS => {
+                return Err(fail(format!("it has {count} elements and no buffer view; at most {MAX_ZEROS} are read")));
+            }
             None => vec![number(&[0; 4][..component]); count * width],
         };
         if let Some(sparse) = accessor.sparse() {

@@ -101,7 +101,11 @@ impl Draco {
         let found = self.0.attribute_by_unique_id(attribute).ok_or_else(|| format!("it has no attribute {attribute}"))?;
         let width = accessor.dimensions().multiplicity();
         if usize::from(found.num_components()) != width {
-            return Err(format!("attribute {attribute} has {} numbers per element, accessor {} has {width}", found.num_components(), accessor.index()));
+            return Err(format!(
+                "attribute {attribute} has {} numbers per element, accessor {} has {width}",
+                found.num_components(),
+                accessor.index()
+            ));
         }
         // Whole numbers of attributes have at most 16 bits, so floats hold them.
         let values = found.read_f32s(self.0.num_points(), width);

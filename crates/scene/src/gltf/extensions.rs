@@ -75,7 +75,6 @@ const KNOWN: &[(&str, Standing)] = &[
     ("VRMC_springBone", Ignored("nothing swings")),
     ("VRMC_node_constraint", Ignored("nodes are not constrained")),
     ("EXT_texture_avif", Convert("npx @gltf-transform/cli png IN.glb OUT.glb --formats \"*\"")),
-    ("MSFT_texture_dds", Convert("npx @gltf-transform/cli png IN.glb OUT.glb --formats \"*\"")),
 ];
 
 fn names(root: &Value, list: &str) -> BTreeSet<String> {

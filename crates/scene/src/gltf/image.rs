@@ -124,9 +124,7 @@ fn decode(bytes: &[u8], texels: u64) -> Result<image::RgbaImage, String> {
             _ => None,
         };
         let convert = match what.as_deref() {
-            Some("it is an AVIF picture" | "it is a DDS texture" | "it is a TIFF picture" | "it is a HEIF picture") => {
-                "; `npx @gltf-transform/cli png IN.glb OUT.glb --formats \"*\"` makes a file that can be read"
-            }
+            Some("it is an AVIF picture") => "; `npx @gltf-transform/cli png IN.glb OUT.glb --formats \"*\"` makes a file that can be read",
             _ => "",
         };
         format!("it cannot be decoded: {}{convert}", what.unwrap_or_else(|| error.to_string()))
@@ -148,7 +146,7 @@ fn transcode(bytes: &[u8], texels: u64) -> Result<image::RgbaImage, String> {
     };
     check_size(width, height, texels)?;
     if format != 0 {
-        let convert = "`ktx encode --codec uastc` of its source picture makes one";
+        let convert = "`ktx encode --codec uastc IN.ktx2 OUT.ktx2` makes one, if its texels are not compressed";
         return Err(format!("it cannot be decoded: it is a KTX2 texture of Vulkan format {format}, not of Basis Universal; {convert}"));
     }
     let broken = |error: basisu::Error| format!("it cannot be decoded as a KTX2 texture of Basis Universal: {error:?}");

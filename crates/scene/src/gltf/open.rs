@@ -46,7 +46,10 @@ fn open_or_tell(bytes: &[u8], allow: bool) -> Result<Opened, String> {
         }
     })?;
     // Chunks are padded, by some writers with zeros.
-    let mut root: Value = serde_json::from_str(text.trim_end_matches('\0')).map_err(|error| {
+    let mut root: Value = serde_json::from_str(
+        text.trim_end_matches(|character: char| character == '\0' || character.is_ascii_whitespace()),
+    )
+    .map_err(|error| {
         let what = if text.trim_start().starts_with('{') { None } else { lobelia_files::describe(text.as_bytes()) };
         format!("not a valid glTF 2.0 file: {}", what.unwrap_or_else(|| error.to_string()))
     })?;
@@ -84,7 +87,8 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], Option<Vec<u8>>), String> {
             break;
         }
         let end = (at + 8).checked_add(length as usize).filter(|end| *end <= bytes.len());
-        let end = end.ok_or_else(|| format!("its chunk at byte {at} declares {length} bytes, which are not there: it is truncated or damaged"))?;
+        let end =
+            end.ok_or_else(|| format!("its chunk at byte {at} declares {length} bytes, which are not there: it is truncated or damaged"))?;
         let chunk = &bytes[at + 8..end];
         match kind {
             b"JSON" if json.is_none() => json = Some(chunk),

@@ -170,13 +170,16 @@ fn node_contents(root: &mut Value, reached: &mut Reached) {
             continue;
         }
         let mut rest = Map::new();
-        let children: Vec<&Value> = list(node, "children").iter().filter(|child| index(Some(child)).is_some_and(|child| child < count)).collect();
+        let children: Vec<&Value> =
+            list(node, "children").iter().filter(|child| index(Some(child)).is_some_and(|child| child < count)).collect();
         if !children.is_empty() {
             rest.insert("children".into(), json!(children));
         }
         for (key, length) in [("translation", 3), ("rotation", 4), ("scale", 3), ("matrix", 16)] {
             let numbers = node.get(key).filter(|_| reached.joints.contains(&place));
-            let fine = |numbers: &&Value| numbers.as_array().is_some_and(|numbers| numbers.len() == length && numbers.iter().all(Value::is_number));
+            let fine = |numbers: &&Value| {
+                numbers.as_array().is_some_and(|numbers| numbers.len() == length && numbers.iter().all(Value::is_number))
+            };
             if let Some(numbers) = numbers.filter(fine) {
                 rest.insert(key.into(), numbers.clone());
             }
@@ -274,7 +277,9 @@ fn primitives(root: &mut Value, reached: &mut Reached, raw: &mut Raw) {
 /// Gives a primitive that Draco compressed accessors of its own, whose elements come out of the compressed data.
 fn decompress(primitive: &mut Map<String, Value>, accessors: &mut Vec<Value>, raw: &mut Raw) {
     let extension = primitive.get("extensions").and_then(|extensions| extensions.get(DRACO)).cloned();
-    let Some((extension, view)) = extension.and_then(|extension| Some((extension.clone(), index(extension.get("bufferView"))?))) else { return };
+    let Some((extension, view)) = extension.and_then(|extension| Some((extension.clone(), index(extension.get("bufferView"))?))) else {
+        return;
+    };
     let identifiers = extension.get("attributes").and_then(Value::as_object).cloned().unwrap_or_default();
     raw.draco_views.push(view);
     let compressed = raw.draco_views.len() - 1;
@@ -310,7 +315,8 @@ fn decompress(primitive: &mut Map<String, Value>, accessors: &mut Vec<Value>, ra
 fn textures(root: &mut Value, reached: &mut Reached, raw: &mut Raw, warnings: &mut Vec<String>) {
     let sources = |texture: &Value| -> Vec<usize> {
         let extensions = texture.get("extensions").and_then(Value::as_object);
-        let source = |name: &str| index(extensions.and_then(|extensions| extensions.get(name)).and_then(|extension| extension.get("source")));
+        let source =
+            |name: &str| index(extensions.and_then(|extensions| extensions.get(name)).and_then(|extension| extension.get("source")));
         let ours = TEXTURE_EXTENSIONS.iter().filter_map(|name| source(name));
         let others = extensions.into_iter().flat_map(Map::keys).filter(|name| !TEXTURE_EXTENSIONS.contains(&name.as_str()));
         ours.chain(index(texture.get("source"))).chain(others.filter_map(|name| source(name))).collect()

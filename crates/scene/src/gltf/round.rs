@@ -69,7 +69,9 @@ pub(super) fn round(root: &mut Value) -> Option<String> {
         }
         let Some(spot) = light.get_mut("spot").filter(|spot| spot.is_object()) else { continue };
         let angle = |key: &str, otherwise: f64| spot.get(key).map_or(Some(otherwise), Value::as_f64);
-        let (Some(inner), Some(outer)) = (angle("innerConeAngle", 0.0), angle("outerConeAngle", std::f64::consts::FRAC_PI_4)) else { continue };
+        let (Some(inner), Some(outer)) = (angle("innerConeAngle", 0.0), angle("outerConeAngle", std::f64::consts::FRAC_PI_4)) else {
+            continue;
+        };
         let rounded = rounded_cone(inner, outer);
         if rounded != (inner, outer) {
             (spot["innerConeAngle"], spot["outerConeAngle"]) = (json!(rounded.0), json!(rounded.1));

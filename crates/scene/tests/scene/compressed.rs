@@ -1,7 +1,9 @@
 //! Compressed meshes and images, made by encoders and read back.
 
 use crate::glb::{Glb, png};
-use draco_core::{DataType, EncoderBuffer, EncoderOptions, FaceIndex, GeometryAttributeType, Mesh, MeshEncoder, PointAttribute, PointIndex};
+use draco_core::{
+    DataType, EncoderBuffer, EncoderOptions, FaceIndex, GeometryAttributeType, Mesh, MeshEncoder, PointAttribute, PointIndex,
+};
 use glam::Vec3;
 use lobelia_scene::Scene;
 use serde_json::{Value, json};
@@ -46,7 +48,8 @@ fn meshopt_views_are_unpacked() {
     let indices = codec::encode_index_buffer(&CORNERS, codec::IndexEncoding::DEFAULT, &mut space).unwrap();
     let view = glb.json["accessors"][3]["bufferView"].as_u64().unwrap() as usize;
     meshopt(&mut glb, view, "TRIANGLES", "NONE", 2, 6, &indices);
-    glb.json["buffers"] = json!([{"byteLength": glb.bin.len()}, {"byteLength": 60, "extensions": {"EXT_meshopt_compression": {"fallback": true}}}]);
+    glb.json["buffers"] =
+        json!([{"byteLength": glb.bin.len()}, {"byteLength": 60, "extensions": {"EXT_meshopt_compression": {"fallback": true}}}]);
     glb.json["extensionsRequired"] = json!(["EXT_meshopt_compression"]);
     let scene = glb.load().unwrap();
     assert_eq!(corners(&scene), corners(&plain));

@@ -362,6 +362,7 @@ fn vertex_colours_and_skins_are_ignored_aloud() {
     let colors = glb.floats("VEC3", &[1.0; 9]);
     glb.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(colors);
     glb.json["skins"] = json!([{"joints": [0]}]);
+    glb.json["nodes"][0]["skin"] = json!(0);
     let warnings = glb.load().unwrap().warnings;
     assert!(warnings.iter().any(|warning| warning == "vertex colours are ignored"), "{warnings:?}");
     assert!(warnings.iter().any(|warning| warning.starts_with("skins are ignored")), "{warnings:?}");

@@ -110,7 +110,10 @@ fn indices_out_of_range() {
         let mut glb = Glb::square(json!({}));
         *glb.json.pointer_mut(pointer).unwrap() = value;
         let error = glb.error();
-        assert!(["out of bounds", "accessor 9, but there are 4", "no buffer 9"].iter().any(|words| error.contains(words)), "{pointer}: {error}");
+        assert!(
+            ["out of bounds", "accessor 9, but there are 4", "no buffer 9"].iter().any(|words| error.contains(words)),
+            "{pointer}: {error}"
+        );
     }
     let mut glb = Glb::triangle();
     glb.json["nodes"][0]["extensions"] = json!({"KHR_lights_punctual": {"light": 3}});

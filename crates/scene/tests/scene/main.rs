@@ -4,11 +4,11 @@
 mod animation;
 mod area_lights;
 mod builtin;
+mod compressed;
 mod conventions;
 mod fuzz;
 mod glb;
 mod hostile;
 mod ron;
 mod shared;
-mod compressed;
 mod usable;

@@ -36,7 +36,10 @@ fn what_nobody_draws_stops_nothing() {
         ("animations", json!({})),
         ("skins", json!({"joints": [99], "inverseBindMatrices": 99})),
         ("cameras", json!({"type": "fisheye"})),
-        ("nodes", json!({"mesh": 99, "skin": 99, "camera": 99, "rotation": [0, 0, 0, 0], "extensions": {"KHR_lights_punctual": {"light": 99}}})),
+        (
+            "nodes",
+            json!({"mesh": 99, "skin": 99, "camera": 99, "rotation": [0, 0, 0, 0], "extensions": {"KHR_lights_punctual": {"light": 99}}}),
+        ),
     ];
     let mut all = painted();
     for (list, value) in &unused {
@@ -91,7 +94,8 @@ fn extensions_are_read_ignored_or_refused() {
     for harmless in ["KHR_materials_variants", "KHR_materials_clearcoat", "KHR_xmp_json_ld", "KHR_materials_sheen", "VRMC_vrm"] {
         warned(&with("extensionsRequired", harmless).load().unwrap(), &format!("extension {harmless} is ignored: "));
     }
-    for read in ["KHR_mesh_quantization", "EXT_texture_webp", "KHR_texture_basisu", "KHR_draco_mesh_compression", "EXT_meshopt_compression"] {
+    for read in ["KHR_mesh_quantization", "EXT_texture_webp", "KHR_texture_basisu", "KHR_draco_mesh_compression", "EXT_meshopt_compression"]
+    {
         assert!(with("extensionsRequired", read).load().unwrap().warnings.is_empty(), "{read}");
     }
     assert_eq!(with("extensionsUsed", "ACME_clay").load().unwrap().warnings, ["extensions ACME_clay are ignored"]);
