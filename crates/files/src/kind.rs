@@ -12,7 +12,7 @@ pub fn stand_in(bytes: &[u8]) -> Option<String> {
 }
 
 /// As [`stand_in`], without archives: what no file of any kind of data begins with, raw numbers included.
-pub(crate) fn placeholder(bytes: &[u8]) -> Option<String> {
+pub fn placeholder(bytes: &[u8]) -> Option<String> {
     if bytes.is_empty() {
         return Some("the file is empty".into());
     }

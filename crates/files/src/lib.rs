@@ -9,7 +9,7 @@ mod kind;
 pub mod radiance;
 mod text;
 
-pub use kind::{describe, kind, stand_in};
+pub use kind::{describe, kind, placeholder, stand_in};
 pub use text::{NoText, text, without_mark};
 
 use std::path::Path;
