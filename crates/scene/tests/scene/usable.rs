@@ -210,7 +210,7 @@ fn rounding_is_clamped_with_a_word_and_no_more() {
         "name": "m", "emissiveFactor": [-1e-9, 4.0, 0], "alphaMode": "MASK", "alphaCutoff": -1e-9,
         "pbrMetallicRoughness": {"baseColorFactor": [1.0000001192, 0.3, -1e-7, 1.0000001], "roughnessFactor": 1.0000001, "metallicFactor": -1e-12},
     }));
-    let spot = glb.light(json!({"type": "spot", "spot": {"innerConeAngle": -1e-9, "outerConeAngle": 1.5708}}));
+    let spot = glb.light(json!({"type": "spot", "spot": {"innerConeAngle": -1e-9, "outerConeAngle": 1.571}}));
     glb.node(json!({"extensions": {"KHR_lights_punctual": {"light": spot}}}));
     let swapped = glb.light(json!({"type": "spot", "intensity": -1e-9, "spot": {"innerConeAngle": 0.8, "outerConeAngle": 0.5}}));
     glb.node(json!({"extensions": {"KHR_lights_punctual": {"light": swapped}}}));
