@@ -27,6 +27,9 @@ const UNLIT: &str = r#"{"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"node
     "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}],"bufferViews":[{"buffer":0,"byteLength":36}],
     "buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;
 
+/// What a clone without Git LFS has in a file's place.
+const POINTER: &str = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 7\n";
+
 /// Files that lie in the folder of every row.
 fn files() -> Vec<(&'static str, Vec<u8>)> {
     // The header of a GLB that ends before the 4000 bytes it promises.
@@ -47,6 +50,13 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
         // The x of the first vertex as the bits 0x7fc00000.
         ("nan.gltf", spoiled("base64,AAAAAAAA", "base64,AADAfwAA")),
         ("buffer.gltf", spoiled("data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA", "nowhere.bin")),
+        ("clay.gltf", spoiled("\"scenes\"", "\"extensionsRequired\":[\"ACME_clay\"],\"scenes\"")),
+        ("pointer.glb", POINTER.into()),
+        ("pointer.ron", POINTER.into()),
+        ("pointer.exr", POINTER.into()),
+        ("page.ron", b"<!DOCTYPE html>".to_vec()),
+        ("wide.ron", "\u{feff}(passes: {})".encode_utf16().flat_map(u16::to_le_bytes).collect()),
+        ("marked.ron", "\u{feff}(passes: {},\noutputs: 1)".into()),
         ("bytes.ron", b"(\n  passes: {\"g\xff\": gbuffer()},\n)".to_vec()),
         ("nothing.ron", Vec::new()),
         ("gbuffer.ron", b"(passes: {\"a\": gbuffer()}, output: \"a.gbuffer\")".to_vec()),
@@ -89,7 +99,7 @@ fn rows() -> Vec<Row> {
     let mut rows = vec![
         // Files and syntax.
         on_graph("syntax", "(\n  passes: {\n    \"a\": gbuffer(,\n  },\n)".into(), &["g.ron:3:18"]),
-        on_arguments("empty", "check nothing.ron", &["nothing.ron:1:1: Unexpected end of RON"]),
+        on_arguments("empty", "check nothing.ron", &["nothing.ron: cannot read the graph: the file is empty"]),
         on_graph("only a comment", "// nothing\n".into(), &["g.ron:1:", "Unexpected end of RON"]),
         on_graph("cut off", "(passes: {\"a\": gbuffer()".into(), &["g.ron:1:"]),
         on_arguments("not UTF-8", "check bytes.ron", &["bytes.ron:2:14: a graph is UTF-8 text, but this byte is not"]),
@@ -465,7 +475,28 @@ fn rows() -> Vec<Row> {
             "scene-info header.glb",
             &["header.glb: a GLB header has 12 bytes, but the file ends after 5"],
         ),
-        on_arguments("empty glTF", "scene-info empty.gltf", &["empty.gltf: not a valid glTF 2.0 file"]),
+        on_arguments("empty glTF", "scene-info empty.gltf", &["empty.gltf: the file is empty"]),
+        on_arguments("pointer as scene", "scene-info pointer.glb", &["pointer.glb: it is a Git LFS pointer, not the data of 7 bytes"]),
+        on_arguments("pointer as graph", "check pointer.ron", &["pointer.ron: cannot read the graph: it is a Git LFS pointer"]),
+        on_arguments("pointer as sweep", "sweep pointer.ron --report .", &["pointer.ron: it is a Git LFS pointer"]),
+        on_arguments("web page as graph", "check page.ron", &["page.ron: cannot read the graph: it is a web page (HTML)"]),
+        on_arguments("UTF-16 graph", "check wide.ron", &["wide.ron: cannot read the graph: it is UTF-16 text; save it as UTF-8"]),
+        on_arguments("fault after a byte-order mark", "check marked.ron", &["marked.ron:2:1: ", "no section `outputs`"]),
+        on_arguments(
+            "unknown extension that is required",
+            "scene-info clay.gltf",
+            &["clay.gltf: it requires ACME_clay, which this program cannot read; `--allow-unsupported`"],
+        ),
+        on_arguments(
+            "pointer as reference",
+            "compare GRAPHS/direct.ron --scene unlit.gltf --size 8x8 --reference pointer.exr --report .",
+            &["pointer.exr: it is a Git LFS pointer"],
+        ),
+        on_arguments(
+            "layer of a reference that is no EXR",
+            "compare GRAPHS/direct.ron --scene unlit.gltf --size 8x8 --reference text.glb#Beauty --report .",
+            &["text.glb#Beauty: cannot be read as an OpenEXR or Radiance HDR picture: it is text that begins with `this is no scene`"],
+        ),
         on_arguments(
             "glTF accessor",
             "scene-info short.gltf",
@@ -599,11 +630,17 @@ fn good_input_is_good() {
     let good = GOOD.replace("resolution: 64", "resolution: 64 // texels\n");
     let good = graph(&good).replace("output:", "variants: {\"v\": {\"visibility\": none, \"rsm\": rsm()}}, output:");
     std::fs::write(folder.path().join("g.ron"), good).unwrap();
+    std::fs::write(folder.path().join("marked.ron"), ["\u{feff}", &graph(GOOD)].concat()).unwrap();
     std::fs::write(folder.path().join("unlit.gltf"), UNLIT).unwrap();
+    std::fs::write(folder.path().join("clay.gltf"), UNLIT.replace("\"scenes\"", "\"extensionsRequired\":[\"ACME_clay\"],\"scenes\""))
+        .unwrap();
     for arguments in [
         "check g.ron GRAPHS/direct.ron GRAPHS/indirect.ron --scene builtin:spheres",
         "explain g.ron --variant v --set lights.count=32 --set indirect.clamp=none --time -1",
         "explain g.ron --scene unlit.gltf --keep sum",
+        "check marked.ron --scene clay.gltf --allow-unsupported",
+        "explain marked.ron --scene clay.gltf --allow-unsupported",
+        "scene-info clay.gltf --allow-unsupported",
         "passes",
         "passes vpl_gather",
         "scene-info builtin:spheres --json",

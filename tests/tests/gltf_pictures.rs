@@ -146,7 +146,7 @@ fn traced(scene: &Scene) -> Image {
     while render.done() < render.passes() {
         render.step();
     }
-    Image { width: EXTENT[0], height: EXTENT[1], pixels: render.picture().pixels }
+    Image { width: EXTENT[0] as usize, height: EXTENT[1] as usize, pixels: render.picture().pixels }
 }
 
 /// The largest difference of the means of each card, over the mean of the picture, and the mean absolute difference of pixels, over the same.

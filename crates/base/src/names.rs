@@ -25,15 +25,11 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         let close = same || edits <= (longest / 3).max(1) && edits < longest || likeness > 0.75;
         // What only begins alike is a second choice, however short: edits count there by the letters that were written and do not fit.
         let misfits = if meant.starts_with(&written) { 1 } else { edits };
-        close.then(|| (Reverse((!same, misfits)), likeness, candidate))
+        close.then_some((Reverse((!same, misfits)), likeness, candidate))
     };
-    let mut best: Option<(Reverse<(bool, usize)>, f64, &'a str)> = None;
-    for found in candidates.into_iter().filter_map(rank) {
-        let better = |best: &(Reverse<(bool, usize)>, f64, &str)| found.0.cmp(&best.0).then(found.1.total_cmp(&best.1)).is_gt();
-        if best.as_ref().is_none_or(better) {
-            best = Some(found);
-        }
-    }
+    // The last of equals is taken, so the list is walked from its end.
+    let found: Vec<_> = candidates.into_iter().filter_map(rank).collect();
+    let best = found.into_iter().rev().max_by(|left, right| left.0.cmp(&right.0).then(left.1.total_cmp(&right.1)));
     best.map(|(.., candidate)| candidate)
 }
 
@@ -43,16 +39,40 @@ mod tests {
     use proptest::prelude::*;
 
     const VARIANTS: [&str; 16] = [
-        "vpl", "vsl", "vsgl", "vsgl-accurate", "vsgl-consistent", "vsgl-steady", "two-vsgl", "interleaved", "flux-density", "bidirectional",
-        "exact-visibility", "imperfect-visibility", "uniform-imperfect-visibility", "no-visibility", "half", "full",
+        "vpl",
+        "vsl",
+        "vsgl",
+        "vsgl-accurate",
+        "vsgl-consistent",
+        "vsgl-steady",
+        "two-vsgl",
+        "interleaved",
+        "flux-density",
+        "bidirectional",
+        "exact-visibility",
+        "imperfect-visibility",
+        "uniform-imperfect-visibility",
+        "no-visibility",
+        "half",
+        "full",
     ];
 
     #[test]
     fn equal_letters_win() {
         for (written, meant) in [
-            ("vgsl", "vsgl"), ("vlp", "vpl"), ("lvs", "vsl"), ("vsg", "vsl"), ("vsgll", "vsgl"), ("VSGL", "vsgl"), ("hafl", "half"), ("ful", "full"),
-            ("no_visibilty", "no-visibility"), ("exact", "exact-visibility"), ("inperfect-visibility", "imperfect-visibility"),
-            ("interleave", "interleaved"), ("vsgl-acurate", "vsgl-accurate"),
+            ("vgsl", "vsgl"),
+            ("vlp", "vpl"),
+            ("lvs", "vsl"),
+            ("vsg", "vsl"),
+            ("vsgll", "vsgl"),
+            ("VSGL", "vsgl"),
+            ("hafl", "half"),
+            ("ful", "full"),
+            ("no_visibilty", "no-visibility"),
+            ("exact", "exact-visibility"),
+            ("inperfect-visibility", "imperfect-visibility"),
+            ("interleave", "interleaved"),
+            ("vsgl-acurate", "vsgl-accurate"),
         ] {
             let found = nearest(written, VARIANTS);
             // `vsg` is one edit from `vsl` and from `vsgl`, and begins the latter.

@@ -4,6 +4,7 @@
 //! still knows its place when a later stage finds fault with it.
 
 use crate::problem::{Problem, Problems, position};
+use lobelia_files::NoText;
 use ron::value::RawValue;
 use serde::{
     Deserialize, Deserializer,
@@ -257,22 +258,20 @@ impl GraphFile {
     /// Reads and takes apart a file.
     pub fn load(path: &Path) -> Result<Self, Problems> {
         let shown = path.display().to_string();
-        match std::fs::read(path).map(String::from_utf8) {
-            Ok(Ok(text)) => Self::parse(&text, &shown),
-            Ok(Err(error)) => {
-                let start = error.utf8_error().valid_up_to();
-                let text = String::from_utf8_lossy(error.as_bytes()).into_owned();
-                Err(Problems {
-                    file: shown,
-                    text,
-                    problems: vec![Problem::at(start..start, "a graph is UTF-8 text, but this byte is not")],
-                })
-            }
-            Err(error) => Err(Problems {
-                file: shown.clone(),
-                text: String::new(),
-                problems: vec![Problem::on_command_line(format!("{shown}: cannot read the graph: {error}"))],
+        let unreadable = |what: String| Problems {
+            file: shown.clone(),
+            text: String::new(),
+            problems: vec![Problem::on_command_line(format!("{shown}: cannot read the graph: {what}"))],
+        };
+        let bytes = std::fs::read(path).map_err(|error| unreadable(error.to_string()))?;
+        match lobelia_files::text(&bytes) {
+            Ok(text) => Self::parse(text, &shown),
+            Err(NoText::NotUtf8 { valid_up_to }) => Err(Problems {
+                text: String::from_utf8_lossy(lobelia_files::without_mark(&bytes)).into_owned(),
+                problems: vec![Problem::at(valid_up_to..valid_up_to, "a graph is UTF-8 text, but this byte is not")],
+                file: shown,
             }),
+            Err(NoText::Other(what)) => Err(unreadable(what)),
         }
     }
 

@@ -18,7 +18,7 @@ use lobelia::{
     SessionOptions,
     frame::SceneWorld,
     graph::{GraphFile, Override, Wired},
-    scene::Ndf,
+    scene::{LoadOptions, Ndf},
 };
 use std::path::{Path, PathBuf};
 
@@ -43,6 +43,21 @@ impl GraphArguments {
     }
 }
 
+/// How a scene is loaded.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct LoadArguments {
+    /// Go on with a warning where a glTF scene requires an extension that is not read or samples an image that cannot be: the picture may be wrong.
+    #[arg(long)]
+    pub allow_unsupported: bool,
+}
+
+impl LoadArguments {
+    /// Session options with nothing else.
+    pub fn options(self) -> SessionOptions {
+        SessionOptions { load: LoadOptions { allow_unsupported: self.allow_unsupported }, ..SessionOptions::default() }
+    }
+}
+
 /// A scene and the moment at which it is seen.
 #[derive(Args, Clone, Debug)]
 pub struct SceneArguments {
@@ -55,12 +70,14 @@ pub struct SceneArguments {
     /// Time of animations in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_negative_numbers = true)]
     pub time: f32,
+    #[command(flatten)]
+    pub load: LoadArguments,
 }
 
 impl SceneArguments {
     /// Session options without a device choice.
     pub fn options(&self) -> SessionOptions {
-        SessionOptions { ndf: self.ndf, time: self.time, ..SessionOptions::default() }
+        SessionOptions { ndf: self.ndf, time: self.time, ..self.load.options() }
     }
 }
 

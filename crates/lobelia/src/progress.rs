@@ -20,7 +20,10 @@ pub fn bar(quiet: bool, length: u64) -> ProgressBar {
     let (target, template) = if terminal {
         (ProgressDrawTarget::stderr(), "{bar:32} {percent:>3} %  {elapsed_precise} (left {left})  {msg}")
     } else {
-        (ProgressDrawTarget::term_like(Box::new(Lines::new(io::stderr(), PERIOD))), "{percent:>3} %, {elapsed_precise} (left {left}), {msg}")
+        (
+            ProgressDrawTarget::term_like(Box::new(Lines::new(io::stderr(), PERIOD))),
+            "{percent:>3} %, {elapsed_precise} (left {left}), {msg}",
+        )
     };
     let bar = ProgressBar::with_draw_target(Some(length), target);
     if let Ok(style) = ProgressStyle::with_template(template) {

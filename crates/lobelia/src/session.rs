@@ -5,7 +5,7 @@ use lobelia_frame::{DisplayImage, Radiance, SceneWorld};
 use lobelia_graph::{FrameReport, Gpu, GpuError, GpuOptions, Plan, PlanOptions, Problems, Resource, RunError, RunOptions, Runner, Wired};
 use lobelia_measure::Image;
 use lobelia_scene::{
-    Camera, Ndf, Scene, SceneError,
+    Camera, LoadOptions, Ndf, Scene, SceneError,
     device::{GpuScene, ViewUniform},
 };
 use std::sync::Arc;
@@ -51,6 +51,8 @@ pub struct SessionOptions {
     pub ndf: Option<Ndf>,
     /// Time of animations in seconds.
     pub time: f32,
+    /// How a scene file is loaded.
+    pub load: LoadOptions,
 }
 
 /// One picture to take.
@@ -159,7 +161,7 @@ impl Session {
         if !options.time.is_finite() {
             return Err(SessionError::Argument(format!("--time is {}, but must be finite", options.time)));
         }
-        let mut scene = Scene::load(address)?;
+        let mut scene = Scene::load_with(address, &options.load)?;
         if let Some(ndf) = options.ndf {
             scene.ndf = ndf;
         }

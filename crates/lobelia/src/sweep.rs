@@ -340,7 +340,7 @@ impl std::str::FromStr for Shard {
 impl Sweep {
     /// Reads a sweep file and refuses what could not be run.
     pub fn load(file: &Path) -> Result<Self, SweepError> {
-        let text = std::fs::read_to_string(file).map_err(|source| SweepError::File { file: file.into(), source })?;
+        let text = lobelia_files::read_text(file).map_err(|what| SweepError::Content { file: file.display().to_string(), what })?;
         Self::parse(&text, &file.display().to_string())
     }
 

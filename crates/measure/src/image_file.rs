@@ -2,6 +2,7 @@
 
 use crate::{Image, MeasureError};
 use exr::prelude::{self as files, WritableImage as _, f16};
+use lobelia_files::radiance::{Radiance, split_layer};
 use std::{
     io::{BufWriter, Seek, Write},
     path::Path,
@@ -17,35 +18,27 @@ pub enum Precision {
     Float,
 }
 
-/// Most pixels of a picture that is read: 16384 x 16384.
-const MAX_PIXELS: usize = 1 << 28;
-
 fn failure(path: &Path, reason: impl std::fmt::Display) -> MeasureError {
     MeasureError::File { file: path.display().to_string(), reason: reason.to_string() }
 }
 
-/// Reads the R, G, B channels of the first layer that has them; half or float.
+/// Reads the picture of an OpenEXR file: its display window, in linear Rec. 709. `truth.exr#Beauty` names a layer; without a name it is the one without
+/// a name, else the only one, and otherwise the message lists what is there.
 pub fn read_exr(path: &Path) -> Result<Image, MeasureError> {
-    // What a header declares is asked for in one piece; a damaged one asks for more than there is.
-    let unreadable = |error: &dyn std::fmt::Display| failure(path, format!("cannot be read as an EXR picture: {error}"));
-    let meta = exr::meta::MetaData::read_from_file(path, false).map_err(|error| unreadable(&error))?;
-    for header in &meta.headers {
-        let size = header.layer_size;
-        if size.width().checked_mul(size.height()).is_none_or(|pixels| pixels > MAX_PIXELS) {
-            return Err(failure(path, format!("it declares {} x {} pixels; at most {MAX_PIXELS} are read", size.width(), size.height())));
-        }
+    read_picture(path).map(|(image, _)| image)
+}
+
+/// As [`read_exr`], for a Radiance HDR file too, with what a user should know of how it was read. A picture of 8 or 16 bits is refused: its numbers have
+/// been through a tone curve and end at 1.
+pub fn read_picture(path: &Path) -> Result<(Image, Vec<String>), MeasureError> {
+    let (file, layer) = split_layer(path);
+    let bytes = lobelia_files::read(&file).map_err(|reason| failure(path, reason))?;
+    if !matches!(lobelia_files::kind(&bytes), Some("an OpenEXR picture" | "a Radiance HDR picture")) {
+        let what = lobelia_files::describe(&bytes).map(|what| format!(": {what}")).unwrap_or_default();
+        return Err(failure(path, format!("cannot be read as an OpenEXR or Radiance HDR picture{what}")));
     }
-    let read = files::read_first_rgba_layer_from_file(
-        path,
-        |resolution, _| (resolution.width(), vec![[0.0f32; 3]; resolution.width() * resolution.height()]),
-        |(width, pixels): &mut (usize, Vec<[f32; 3]>), position, (r, g, b, _): (f32, f32, f32, f32)| {
-            pixels[position.y() * *width + position.x()] = [r, g, b];
-        },
-    )
-    .map_err(|error| failure(path, format!("cannot be read as an EXR picture: {error}")))?;
-    let size = read.layer_data.size;
-    let (_, pixels) = read.layer_data.channel_data.pixels;
-    Ok(Image { width: size.width(), height: size.height(), pixels })
+    let read = Radiance::decode(&bytes, layer.as_deref()).map_err(|reason| failure(&file, reason))?;
+    Ok((Image { width: read.width, height: read.height, pixels: read.pixels }, read.notes))
 }
 
 /// Writes an EXR file of [`Precision::Float`].
@@ -178,11 +171,35 @@ mod tests {
     }
 
     #[test]
+    fn a_layer_is_named_after_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("layers.exr");
+        let channels = ["Beauty.R", "Beauty.G", "Beauty.B", "Albedo.R", "Albedo.G", "Albedo.B"];
+        let list =
+            channels.iter().zip(1..).map(|(name, value)| files::AnyChannel::new(*name, files::FlatSamples::F32(vec![value as f32; 2])));
+        let channels = files::AnyChannels::sort(list.collect());
+        files::Image::from_channels((2, 1), channels).write().to_file(&path).unwrap();
+        let read = |layer: &str| read_exr(&folder.path().join(format!("layers.exr{layer}")));
+        assert_eq!(read("#Albedo").unwrap().pixels, [[4.0, 5.0, 6.0]; 2]);
+        assert_eq!(read("#Beauty").unwrap(), Image { width: 2, height: 1, pixels: vec![[1.0, 2.0, 3.0]; 2] });
+        // The whole picture, by its name.
+        assert_eq!(read("").unwrap(), read("#Beauty").unwrap());
+        let message = read("#Betty").unwrap_err().to_string();
+        assert!(message.contains("layers.exr: it has no layer `Betty`") && message.contains("`Albedo`, `Beauty`"), "{message}");
+        assert!(read_exr(&folder.path().join("none.exr#Beauty")).unwrap_err().to_string().contains("none.exr"));
+    }
+
+    #[test]
     fn what_is_no_picture_is_refused_by_name() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("b.exr");
         std::fs::write(&path, b"not a picture").unwrap();
         assert!(read_exr(&path).unwrap_err().to_string().contains("b.exr"));
+        std::fs::write(&path, b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 7\n").unwrap();
+        assert!(read_exr(&path).unwrap_err().to_string().contains("b.exr: it is a Git LFS pointer"));
+        write_png(&path, 1, 1, &[7; 4]).unwrap();
+        let refused = read_exr(&path).unwrap_err().to_string();
+        assert!(refused.contains("cannot be read as an OpenEXR or Radiance HDR picture: it is a PNG picture"), "{refused}");
         assert!(read_exr(&folder.path().join("missing.exr")).is_err());
         write_exr(&path, &picture()).unwrap();
         let whole = std::fs::read(&path).unwrap();

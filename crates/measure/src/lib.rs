@@ -17,7 +17,7 @@ mod ssim;
 pub mod timing;
 
 pub use flip::{flip_hdr, flip_ldr};
-pub use image_file::{Precision, WriteSeek, read_exr, replace_file, write_exr, write_exr_with, write_png};
+pub use image_file::{Precision, WriteSeek, read_exr, read_picture, replace_file, write_exr, write_exr_with, write_png};
 pub use mask::Mask;
 pub use metric::{Statistics, compare, mean, relative_mse, relative_mse_with_epsilon, rmse};
 pub use metrics::{Metrics, display, false_colour, measure, measure_each, relative_error_map};

@@ -3,12 +3,12 @@
 /// A scene could not be loaded or used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SceneError {
-    /// A file could not be read.
-    #[error("{file}: cannot be read: {reason}")]
+    /// A file could not be read, or holds something else.
+    #[error("{file}: {reason}")]
     Unreadable {
         /// Path.
         file: String,
-        /// The system's words.
+        /// Why.
         reason: String,
     },
     /// Neither a builtin nor a known file type.

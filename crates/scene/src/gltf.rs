@@ -1,28 +1,32 @@
 //! Reading glTF 2.0.
 //!
-//! The `gltf` crate parses and validates the JSON; everything that touches bytes is checked here against what is really there before anything is
-//! allocated, so that a hostile file ends in a message.
+//! The `gltf` crate holds the document of what is drawn; everything that touches bytes is checked here against what is really there before anything is
+//! allocated, so that a hostile file ends in a message. Buffers and images are read when something asks for them.
 
 mod accessor;
 pub(crate) mod area_light;
+mod compressed;
 mod extensions;
 mod image;
 mod instancing;
 mod material;
 mod open;
 mod primitive;
+mod reach;
+mod round;
 mod skin;
 mod specular_glossiness;
 mod tree;
 
 use crate::{
-    Camera, Instance, LightKind, Mesh, PunctualLight, Scene, SceneError, files,
+    Camera, Instance, LightKind, LoadOptions, Mesh, PunctualLight, Scene, SceneError,
     pose::{Pose, Poses, Rest, Skin},
 };
 use accessor::Buffers;
 use base64::Engine;
 use glam::{DMat4, DVec3, Vec3};
 use gltf::khr_lights_punctual::Kind;
+use image::Images;
 use std::{collections::HashMap, path::Path, sync::Arc};
 
 /// Most vertices and most triangles that all meshes together may have. A file can use the same numbers many times over, so its own size is no bound.
@@ -32,20 +36,21 @@ const MAX_MESH_ELEMENTS: usize = 1 << 24;
 const MAX_AREA_LIGHTS: usize = 4096;
 
 /// Loads a `.glb` or `.gltf` file.
-pub(crate) fn load(path: &Path) -> Result<Scene, SceneError> {
+pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
     let shown = path.display().to_string();
-    let bytes = files::read(path).map_err(|reason| SceneError::Unreadable { file: shown.clone(), reason })?;
-    parse(&bytes, &shown, path.parent())
+    let bytes = lobelia_files::read(path).map_err(|reason| SceneError::Unreadable { file: shown.clone(), reason })?;
+    parse(&bytes, &shown, path.parent(), options)
 }
 
 /// Reads a file's bytes; `folder` is where its external files lie.
-pub(crate) fn parse(bytes: &[u8], shown: &str, folder: Option<&Path>) -> Result<Scene, SceneError> {
-    let mut gltf = open::open(bytes, shown)?;
-    let buffers = Buffers::load(&mut gltf, shown, folder)?;
+pub(crate) fn parse(bytes: &[u8], shown: &str, folder: Option<&Path>, options: &LoadOptions) -> Result<Scene, SceneError> {
+    let open::Opened { gltf, blob, raw, warnings } = open::open(bytes, shown, options.allow_unsupported)?;
     let mut loader = Loader {
         shown,
         scene: Scene::default(),
-        buffers,
+        buffers: Buffers::new(raw, blob, folder),
+        images: Images::new(folder),
+        allow_unsupported: options.allow_unsupported,
         uv_sets: Vec::new(),
         primitives: HashMap::new(),
         meshes: Vec::new(),
@@ -56,8 +61,7 @@ pub(crate) fn parse(bytes: &[u8], shown: &str, folder: Option<&Path>) -> Result<
         mesh_elements: 0,
         dropped: None,
     };
-    loader.extensions(&gltf);
-    loader.scene.textures = Arc::new(image::load(&gltf, &loader.buffers, shown, folder)?);
+    warnings.into_iter().for_each(|warning| loader.warn(warning));
     loader.materials(&gltf)?;
     let (order, in_scene) = loader.nodes(&gltf)?;
     let place: HashMap<usize, usize> = order.iter().enumerate().map(|(place, node)| (*node, place)).collect();
@@ -67,7 +71,11 @@ pub(crate) fn parse(bytes: &[u8], shown: &str, folder: Option<&Path>) -> Result<
     if let Some((count, at)) = loader.dropped.take() {
         loader.warn(format!("triangles without area are dropped: {count}, first in {at}"));
     }
-    let Loader { mut scene, meshes, rests, skins, poses, .. } = loader;
+    for warning in loader.images.warnings.split_off(0).into_iter().chain(loader.buffers.take_warnings()).chain(loader.buffers.unread()) {
+        loader.warn(warning);
+    }
+    let Loader { mut scene, meshes, rests, skins, poses, images, .. } = loader;
+    scene.textures = Arc::new(images.textures);
     scene.meshes = Arc::new(meshes);
     if !poses.is_empty() {
         scene.poses = Poses { rests: Arc::new(rests), skins: Arc::new(skins), poses };
@@ -94,8 +102,11 @@ fn read_uri(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>, String> {
             .decode(encoded)
             .map_err(|error| format!("a data URI with broken base64: {error}"));
     }
-    let path = folder.unwrap_or(Path::new(".")).join(percent_decoded(uri));
-    files::read(&path).map_err(|reason| format!("{}: cannot be read: {reason}", path.display()))
+    let folder = folder.unwrap_or(Path::new("."));
+    let decoded = folder.join(percent_decoded(uri));
+    // A name with a percent sign that nobody encoded.
+    let path = if decoded.exists() { decoded } else { Some(folder.join(uri)).filter(|plain| plain.exists()).unwrap_or(decoded) };
+    lobelia_files::read_raw(&path).map_err(|reason| format!("{}: {reason}", path.display()))
 }
 
 fn percent_decoded(uri: &str) -> String {
@@ -121,6 +132,8 @@ struct Loader<'a> {
     shown: &'a str,
     scene: Scene,
     buffers: Buffers,
+    images: Images,
+    allow_unsupported: bool,
     /// Which texture coordinates each material reads.
     uv_sets: Vec<material::UvSets>,
     /// What each glTF primitive that has been read is.
@@ -154,16 +167,6 @@ impl Loader<'_> {
         let message = message.into();
         if !self.scene.warnings.contains(&message) {
             self.scene.warnings.push(message);
-        }
-    }
-
-    fn extensions(&mut self, gltf: &gltf::Gltf) {
-        let other: Vec<&str> = gltf.extensions_used().filter(|name| !extensions::is_known(name)).collect();
-        if !other.is_empty() {
-            self.warn(format!("extensions {} are ignored", other.join(", ")));
-        }
-        for (name, lost) in gltf.extensions_used().filter_map(|name| Some((name, extensions::lost_of_file(name)?))) {
-            self.warn(format!("{name} is not read: {lost}"));
         }
     }
 
@@ -326,7 +329,7 @@ pub(crate) fn check_light(kind: LightKind, intensity: Vec3) -> Result<(), String
         return Err(format!("its intensity is {intensity}, but must be finite and not negative"));
     }
     if let LightKind::Spot { inner, outer } = kind
-        && !(inner >= 0.0 && inner <= outer && outer > 0.0 && outer <= std::f32::consts::FRAC_PI_2 + 1e-6)
+        && !(inner >= 0.0 && inner <= outer && outer > 0.0 && outer <= std::f32::consts::FRAC_PI_2)
     {
         return Err(format!("its cone angles are {inner} and {outer}, but 0 <= inner <= outer <= pi/2 must hold"));
     }

@@ -10,7 +10,7 @@
 //! (
 //!     gltf: "atrium.glb",                          // beside this file, or "builtin:cornell-glossy"
 //!     ndf: phong,                                  // ggx (default) or phong
-//!     environment: (file: "sky.hdr", scale: 0.5),  // .hdr or .exr
+//!     environment: (file: "sky.hdr", scale: 0.5),  // .hdr, .exr (a layer: "sky.exr#Sky"), or a picture, which has no range above 1
 //!     cameras: {                                   // added, or replacing one of that name; the first is the default
 //!         "close": (origin: (0, 1, 3), target: (0, 1, 0), up: (0, 1, 0), yfov: 0.7, near: 0.01),
 //!     },
@@ -34,16 +34,21 @@
 //! A glTF node with `extras.area_light` is a light with extent: `{"shape": "quad", "width", "height"}`, `{"shape": "disk", "radius"}` or
 //! `{"shape": "sphere", "radius"}`, each with `"radiance": [r, g, b]`; quad and disk emit towards local -Z.
 //!
+//! Of a glTF file only what the scene draws is read; what nothing reaches may be broken or absent. Meshes may be compressed
+//! (`KHR_draco_mesh_compression`, `EXT_meshopt_compression`), images may be PNG, JPEG, WebP or KTX2 of Basis Universal. A file that requires an extension
+//! which is not read is refused, unless [`LoadOptions::allow_unsupported`] is set.
+//!
 //! Not drawn as the file says, with a word in [`Scene::warnings`]: blended surfaces (opaque here), occlusion textures, points and lines, ranges of
-//! lights, and what the table in `docs/gltf.md` says of extensions.
+//! lights, and what the table in `docs/gltf.md` says of extensions. Numbers that are
+//! out of range by rounding, up to 0.001, are clamped with a word too, and so are pixels of an environment that are no radiance.
 
 mod animation;
 mod builtin;
 mod camera;
 pub mod device;
+mod environment;
 mod error;
 mod exposure;
-mod files;
 mod gltf;
 mod light;
 mod material;
@@ -111,6 +116,14 @@ pub struct Scene {
     version: u64,
 }
 
+/// How a scene is loaded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LoadOptions {
+    /// Go on, with a word in [`Scene::warnings`], where a glTF file requires an extension that is not read or samples an image that cannot be: the
+    /// picture may be wrong then.
+    pub allow_unsupported: bool,
+}
+
 /// A mesh in the world.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Instance {
@@ -130,14 +143,19 @@ pub struct Instance {
 impl Scene {
     /// Loads `builtin:NAME`, a `.glb` or `.gltf` file, or a RON scene.
     pub fn load(address: &str) -> Result<Self, SceneError> {
+        Self::load_with(address, &LoadOptions::default())
+    }
+
+    /// As [`Scene::load`], with options.
+    pub fn load_with(address: &str, options: &LoadOptions) -> Result<Self, SceneError> {
         let mut scene = match address.strip_prefix("builtin:") {
             Some(name) => builtin::load(name)?,
             None => {
                 let path = std::path::Path::new(address);
                 let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase();
                 match ending.as_str() {
-                    "glb" | "gltf" => gltf::load(path)?,
-                    "ron" => wrapper::load(path)?,
+                    "glb" | "gltf" => gltf::load(path, options)?,
+                    "ron" => wrapper::load(path, options)?,
                     _ => return Err(SceneError::UnknownKind { file: address.into() }),
                 }
             }

@@ -170,3 +170,15 @@ impl fmt::Debug for Environment {
         write!(formatter, "Environment({}, {} x {}, scale {})", self.name, self.width, self.height, self.scale)
     }
 }
+
+/// What is out of range by no more than this is out by rounding: factors written with three digits, pi / 2 as 1.571.
+pub(crate) const ROUNDING: f64 = 1e-3;
+
+/// Cone angles, radians, with rounding undone: an outer angle just beyond pi / 2 and an inner one just below 0 are clamped, and an inner angle beyond
+/// the outer one is the outer one, for then the cone has a hard edge.
+pub(crate) fn rounded_cone(inner: f64, outer: f64) -> (f64, f64) {
+    let most = f64::from(std::f32::consts::FRAC_PI_2);
+    let outer = if outer > most && outer <= most + ROUNDING { most } else { outer };
+    let inner = if (-ROUNDING..0.0).contains(&inner) { 0.0 } else { inner };
+    (if inner > outer && outer > 0.0 { outer } else { inner }, outer)
+}

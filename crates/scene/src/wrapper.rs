@@ -3,11 +3,13 @@
 mod motion;
 mod position;
 
-use crate::{Camera, Environment, LightKind, Ndf, PunctualLight, Scene, SceneError, error::suggestion, files, gltf::check_light};
+use crate::{
+    Camera, LightKind, LoadOptions, Ndf, PunctualLight, Scene, SceneError, environment, error::suggestion, gltf::check_light, light,
+};
 use glam::{DVec3, Vec3};
 use position::Step::{self, Field, Quoted};
 use serde::{Deserialize, Deserializer, de::MapAccess};
-use std::{fmt, io::Cursor, marker::PhantomData, path::Path};
+use std::{fmt, marker::PhantomData, path::Path};
 
 /// A map that keeps the order of the file.
 #[derive(Debug)]
@@ -166,9 +168,11 @@ impl Entry<'_> {
         direction.try_normalize().ok_or_else(|| self.fail(field, format_args!("{field} is zero, and so points nowhere")))
     }
 
+    /// A number in [0, 1]; one that is out of range by rounding is clamped.
     fn unit(&self, field: &str, value: f32) -> Result<f32, SceneError> {
-        if (0.0..=1.0).contains(&value) {
-            Ok(value)
+        let rounded = value.clamp(0.0, 1.0);
+        if f64::from((value - rounded).abs()) <= light::ROUNDING {
+            Ok(rounded)
         } else {
             Err(self.fail(field, format_args!("{field} is {value}, but must lie in [0, 1]")))
         }
@@ -176,14 +180,13 @@ impl Entry<'_> {
 }
 
 /// Loads a RON scene.
-pub(crate) fn load(path: &Path) -> Result<Scene, SceneError> {
+pub(crate) fn load(path: &Path, load: &LoadOptions) -> Result<Scene, SceneError> {
     let shown = path.display().to_string();
-    let unreadable = |reason: String| SceneError::Unreadable { file: shown.clone(), reason };
-    let text = files::read(path).and_then(|bytes| String::from_utf8(bytes).map_err(|error| error.to_string())).map_err(unreadable)?;
-    parse(&text, &shown, path.parent().unwrap_or(Path::new(".")))
+    let text = lobelia_files::read_text(path).map_err(|reason| SceneError::Unreadable { file: shown.clone(), reason })?;
+    parse(&text, &shown, path.parent().unwrap_or(Path::new(".")), load)
 }
 
-pub(crate) fn parse(text: &str, shown: &str, folder: &Path) -> Result<Scene, SceneError> {
+pub(crate) fn parse(text: &str, shown: &str, folder: &Path, load: &LoadOptions) -> Result<Scene, SceneError> {
     let file = File { path: shown.to_owned(), text };
     let options = ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
     let written: Written = options.from_str(text).map_err(|error| {
@@ -194,7 +197,7 @@ pub(crate) fn parse(text: &str, shown: &str, folder: &Path) -> Result<Scene, Sce
     if base.to_lowercase().ends_with(".ron") {
         return Err(file.about(&[Field("gltf")], "a RON scene wraps a glTF file or a built-in scene, not another RON scene", None));
     }
-    let mut scene = Scene::load(&base)?;
+    let mut scene = Scene::load_with(&base, load)?;
     if !written.keep_lights {
         scene.drop_lights();
     }
@@ -202,7 +205,15 @@ pub(crate) fn parse(text: &str, shown: &str, folder: &Path) -> Result<Scene, Sce
         scene.ndf = ndf;
     }
     if let Some(environment) = &written.environment {
-        scene.environment = Some(load_environment(&file, environment, folder)?);
+        let fail =
+            |field: &str, message: String| file.about(&[Field("environment"), Field(field)], format!("environment: {message}"), None);
+        let scale = environment.scale;
+        if !(scale.is_finite() && scale >= 0.0) {
+            return Err(fail("scale", format!("scale is {scale}, but must be finite and not negative")));
+        }
+        let (environment, notes) = environment::load(&folder.join(&environment.file), scale).map_err(|message| fail("file", message))?;
+        scene.environment = Some(environment);
+        scene.warnings.extend(notes);
     }
     add_cameras(&file, &mut scene, &written.cameras)?;
     add_lights(&file, &mut scene, &written.lights)?;
@@ -221,40 +232,6 @@ fn unknown_field_help(error: &ron::Error) -> Option<String> {
 
 fn vec3((x, y, z): (f32, f32, f32)) -> Vec3 {
     Vec3::new(x, y, z)
-}
-
-/// Largest side of an environment map: the largest texture that every WebGPU device takes.
-const MAX_SIDE: u32 = 8192;
-
-fn load_environment(file: &File<'_>, written: &WrittenEnvironment, folder: &Path) -> Result<Environment, SceneError> {
-    let fail = |field: &str, message: String| file.about(&[Field("environment"), Field(field)], format!("environment: {message}"), None);
-    if !(written.scale.is_finite() && written.scale >= 0.0) {
-        return Err(fail("scale", format!("scale is {}, but must be finite and not negative", written.scale)));
-    }
-    let path = folder.join(&written.file);
-    let name = path.display().to_string();
-    let bytes = files::read(&path).map_err(|reason| fail("file", format!("{name}: cannot be read: {reason}")))?;
-    let pixels = decode(&bytes).map_err(|reason| fail("file", format!("{name}: {reason}")))?;
-    let (width, height) = pixels.dimensions();
-    let pixels: Vec<Vec3> = pixels.pixels().map(|pixel| Vec3::from_array(pixel.0)).collect();
-    if let Some(place) = pixels.iter().position(|pixel| !pixel.is_finite() || pixel.min_element() < 0.0) {
-        let (x, y) = (place as u32 % width, place as u32 / width);
-        return Err(fail("file", format!("{name}: pixel ({x}, {y}) is {}, but radiance must be finite and not negative", pixels[place])));
-    }
-    Ok(Environment { name, width, height, pixels, scale: written.scale })
-}
-
-fn decode(bytes: &[u8]) -> Result<image::Rgb32FImage, String> {
-    let mut reader =
-        image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|error| format!("cannot be read: {error}"))?;
-    let mut limits = image::Limits::default();
-    (limits.max_image_width, limits.max_image_height, limits.max_alloc) = (Some(MAX_SIDE), Some(MAX_SIDE), Some(1 << 30));
-    reader.limits(limits);
-    let pixels = reader.decode().map_err(|error| format!("cannot be decoded: {error}"))?.to_rgb32f();
-    if pixels.width() == 0 || pixels.height() == 0 {
-        return Err("it has no pixels".into());
-    }
-    Ok(pixels)
 }
 
 fn add_cameras(file: &File<'_>, scene: &mut Scene, cameras: &Ordered<WrittenCamera>) -> Result<(), SceneError> {
@@ -286,7 +263,13 @@ fn add_lights(file: &File<'_>, scene: &mut Scene, lights: &Ordered<WrittenLight>
         let (kind, position, direction, intensity) = match *light {
             WrittenLight::Point { position, intensity } => (LightKind::Point, entry.point("position", position)?, DVec3::NEG_Z, intensity),
             WrittenLight::Spot { position, direction, intensity, inner, outer } => {
-                let kind = LightKind::Spot { inner, outer };
+                let rounded = light::rounded_cone(inner.into(), outer.into());
+                if rounded != (inner.into(), outer.into()) {
+                    scene
+                        .warnings
+                        .push(format!("light `{name}`: cone angles of {inner} and {outer} are clamped to {} and {}", rounded.0, rounded.1));
+                }
+                let kind = LightKind::Spot { inner: rounded.0 as f32, outer: rounded.1 as f32 };
                 (kind, entry.point("position", position)?, entry.direction("direction", direction)?, intensity)
             }
             WrittenLight::Directional { direction, illuminance } => {
@@ -326,6 +309,7 @@ fn change_materials(file: &File<'_>, scene: &mut Scene, changes: &Ordered<Writte
         for channel in base_color.iter().flat_map(|color| color.to_array()) {
             entry.unit("base_color", channel)?;
         }
+        let base_color = base_color.map(|color| color.clamp(Vec3::ZERO, Vec3::ONE));
         let emissive = change.emissive.map(vec3);
         if let Some(emissive) = emissive.filter(|color| !color.is_finite() || color.min_element() < 0.0) {
             return Err(entry.fail("emissive", format_args!("emissive is {emissive}, but must be finite and not negative")));

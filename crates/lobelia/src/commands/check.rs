@@ -1,6 +1,7 @@
+use super::LoadArguments;
 use crate::failure::Failure;
 use lobelia::{
-    Session, SessionOptions,
+    Session,
     graph::{GraphFile, PlanOptions, Problems},
 };
 use std::{io::Write, path::PathBuf};
@@ -15,12 +16,14 @@ pub struct Arguments {
     /// Plan each for this scene as well.
     #[arg(long, value_name = "SCENE")]
     scene: Option<String>,
+    #[command(flatten)]
+    load: LoadArguments,
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let registry = lobelia::registry();
     let traits = match &arguments.scene {
-        Some(address) => Some(Session::load(address, &SessionOptions::default())?.traits()),
+        Some(address) => Some(Session::load(address, &arguments.load.options())?.traits()),
         None => None,
     };
     let mut out = std::io::stdout().lock();

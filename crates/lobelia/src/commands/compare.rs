@@ -11,7 +11,7 @@ use lobelia::{
     frame::LightTransport,
     graph::Override,
     light::{self, Claim, Lights},
-    measure::{self, Image, read_exr},
+    measure::{self, Image, read_exr, read_picture},
     reference::{LightPaths, Settings},
     report::{self, Light},
     trial::{self, Technique, TrialOptions},
@@ -62,7 +62,7 @@ pub struct Arguments {
 /// What is the truth.
 #[derive(clap::Args, Clone, Debug)]
 pub struct TruthArguments {
-    /// Picture to compare with (.exr, linear RGB) instead of a path-traced one.
+    /// Picture to compare with (.exr or .hdr, linear light) instead of a path-traced one; R.exr#LAYER names a layer.
     #[arg(long, value_name = "R.exr")]
     pub reference: Option<PathBuf>,
     /// Light in the path-traced reference instead of what the graphs cast: of these classes of lights (punctual, area, emissive, environment, separated by commas), or of
@@ -239,7 +239,12 @@ pub fn reference(
     quiet: bool,
 ) -> Result<Known, Failure> {
     if let Some(file) = &truth.reference {
-        let image = read_exr(file).map_err(|error| Failure::Input(error.to_string()))?;
+        let (image, notes) = read_picture(file).map_err(|error| Failure::Input(error.to_string()))?;
+        if !quiet {
+            for note in &notes {
+                eprintln!("warning: {}: {note}", file.display());
+            }
+        }
         let size = [image.width, image.height];
         if size != shot.size.map(|side| side as usize) {
             let what =

@@ -1,3 +1,4 @@
+use super::LoadArguments;
 use crate::failure::Failure;
 use lobelia::{Session, SessionOptions, scene::Ndf};
 use std::io::Write;
@@ -14,13 +15,15 @@ pub struct Arguments {
     /// Time of animations in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
     time: f32,
+    #[command(flatten)]
+    load: LoadArguments,
     /// Print JSON.
     #[arg(long)]
     json: bool,
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let options = SessionOptions { ndf: arguments.ndf, time: arguments.time, ..SessionOptions::default() };
+    let options = SessionOptions { ndf: arguments.ndf, time: arguments.time, ..arguments.load.options() };
     let scene = Session::load(&arguments.scene, &options)?;
     let traits = scene.traits();
     let casters = lobelia::light::casters(&lobelia::registry(), &traits);

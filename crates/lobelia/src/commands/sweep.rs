@@ -1,4 +1,5 @@
 use super::{
+    LoadArguments,
     compare::{Known, ShotArguments, TruthArguments, compared_light, make_folder, reference, trial_bar, write_text},
     compare_report::{floor, metrics},
 };
@@ -6,7 +7,7 @@ use crate::failure::Failure;
 use comfy_table::{CellAlignment, Table, presets};
 use indicatif::ProgressBar;
 use lobelia::{
-    Session, SessionOptions,
+    Session,
     graph::GraphFile,
     light::{self, Claim},
     measure::sampled::Interval,
@@ -74,6 +75,8 @@ pub struct Arguments {
     /// Use only what every WebGPU device has.
     #[arg(long)]
     baseline: bool,
+    #[command(flatten)]
+    load: LoadArguments,
     /// Print nothing but errors.
     #[arg(short, long)]
     quiet: bool,
@@ -217,7 +220,7 @@ fn run_cell(arguments: &Arguments, sweep: &Sweep, cell: &Cell, references: &mut 
 
 fn fill(arguments: &Arguments, sweep: &Sweep, cell: &Cell, references: &mut References, row: &mut Row) -> Result<(), Failure> {
     let wired = GraphFile::load(Path::new(&sweep.graph))?.wire(&lobelia::registry(), &cell.variants(), &cell.overrides())?;
-    let scene = Session::load(&cell.scene, &SessionOptions::default())?;
+    let scene = Session::load(&cell.scene, &arguments.load.options())?;
     let shot_arguments = ShotArguments {
         output: sweep.output.clone(),
         camera: sweep.camera.clone(),

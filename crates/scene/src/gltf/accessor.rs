@@ -1,12 +1,20 @@
-//! Numbers out of buffers, checked against what is really there.
+//! Numbers out of buffers, checked against what is really there. A buffer is read when something first asks for it.
 
-use super::read_uri;
+use super::{
+    compressed::{self, Packed},
+    reach::Raw,
+    read_uri,
+};
 use crate::SceneError;
 use gltf::accessor::{
     DataType,
     sparse::{IndexType, Sparse},
 };
-use std::path::Path;
+use serde_json::Value;
+use std::{
+    cell::{Cell, OnceCell, RefCell},
+    path::{Path, PathBuf},
+};
 
 /// Where elements lie in a buffer view, bytes.
 #[derive(Clone, Copy)]
@@ -20,50 +28,157 @@ struct Layout {
 /// Most bytes that all buffers together may have.
 const MAX_BYTES: usize = 1 << 30;
 
-/// The bytes of all buffers.
-pub(crate) struct Buffers(Vec<Vec<u8>>);
+/// Most elements of an accessor that has no bytes of its own: a file of nothing may not ask for memory without bound.
+const MAX_ZEROS: usize = 1 << 24;
+
+/// The bytes of all buffers, and how they are divided.
+pub(crate) struct Buffers {
+    raw: Raw,
+    blob: Option<Vec<u8>>,
+    folder: Option<PathBuf>,
+    buffers: Vec<OnceCell<Result<Vec<u8>, String>>>,
+    /// What compressed views hold, where they have been asked for.
+    unpacked: Vec<OnceCell<Result<Vec<u8>, String>>>,
+    meshes: Vec<OnceCell<Result<compressed::Draco, String>>>,
+    total: Cell<usize>,
+    warnings: RefCell<Vec<String>>,
+}
+
+/// A number of a JSON object that says how many bytes.
+fn bytes_of(value: &Value, key: &str) -> Result<usize, String> {
+    match value.get(key) {
+        None => Ok(0),
+        Some(number) => {
+            let number = number.as_u64().and_then(|number| usize::try_from(number).ok());
+            number.ok_or_else(|| format!("its {key} is no number of bytes"))
+        }
+    }
+}
+
+fn cells<T>(count: usize) -> Vec<OnceCell<T>> {
+    (0..count).map(|_| OnceCell::new()).collect()
+}
 
 impl Buffers {
-    pub fn load(gltf: &mut gltf::Gltf, shown: &str, folder: Option<&Path>) -> Result<Self, SceneError> {
-        let mut blob = gltf.blob.take();
-        let mut buffers = Vec::new();
-        let mut total = 0;
-        for buffer in gltf.buffers() {
-            let fail = |message: String| SceneError::content(shown, format!("buffer {}: {message}", buffer.index()));
-            let bytes = match buffer.source() {
-                gltf::buffer::Source::Bin if buffer.index() > 0 => {
-                    return Err(fail("it has no uri; only buffer 0 may be the binary chunk".into()));
-                }
-                gltf::buffer::Source::Bin => blob.take().ok_or_else(|| fail("it has no uri and the file no binary chunk".into()))?,
-                gltf::buffer::Source::Uri(uri) => read_uri(uri, folder).map_err(fail)?,
-            };
-            if bytes.len() < buffer.length() {
-                return Err(fail(format!("{} bytes are declared, but only {} are there", buffer.length(), bytes.len())));
-            }
-            total += bytes.len();
-            if total > MAX_BYTES {
-                return Err(fail(format!("the buffers have more than {MAX_BYTES} bytes")));
-            }
-            buffers.push(bytes);
+    /// Nothing is read yet; `folder` is where buffers of their own files lie.
+    pub fn new(raw: Raw, blob: Option<Vec<u8>>, folder: Option<&Path>) -> Self {
+        Self {
+            buffers: cells(raw.buffers.len()),
+            unpacked: cells(raw.views.len()),
+            meshes: cells(raw.draco_views.len()),
+            folder: folder.map(Path::to_owned),
+            total: Cell::new(0),
+            warnings: RefCell::default(),
+            raw,
+            blob,
         }
-        Ok(Self(buffers))
     }
 
-    /// The bytes of a view.
-    pub fn view(&self, shown: &str, view: &gltf::buffer::View<'_>) -> Result<&[u8], SceneError> {
-        let buffer = &self.0[view.buffer().index()];
-        let end = view.offset().checked_add(view.length());
-        end.and_then(|end| buffer.get(view.offset()..end)).ok_or_else(|| {
-            let what = format!(
-                "buffer view {}: bytes {} to {} lie outside of buffer {}, which has {}",
-                view.index(),
-                view.offset(),
-                view.offset().saturating_add(view.length()),
-                view.buffer().index(),
-                buffer.len()
-            );
-            SceneError::content(shown, what)
+    /// What a document does not hold.
+    pub fn raw(&self) -> &Raw {
+        &self.raw
+    }
+
+    /// Takes what was not read as it stands.
+    pub fn take_warnings(&self) -> Vec<String> {
+        std::mem::take(&mut self.warnings.borrow_mut())
+    }
+
+    /// The buffers and buffer views of which nothing was asked, in words; nothing if there are none.
+    pub fn unread(&self) -> Option<String> {
+        let unread: Vec<String> =
+            (0..self.buffers.len()).filter(|buffer| self.buffers[*buffer].get().is_none()).map(|buffer| buffer.to_string()).collect();
+        (!unread.is_empty()).then(|| format!("buffers that nothing drawn uses are not read: {}", unread.join(", ")))
+    }
+
+    fn buffer(&self, index: usize) -> Result<&[u8], String> {
+        let (Some(cell), Some(written)) = (self.buffers.get(index), self.raw.buffers.get(index)) else {
+            return Err(format!("there is no buffer {index}, but {}", self.buffers.len()));
+        };
+        let read = || {
+            let length = bytes_of(written, "byteLength")?;
+            let data = match written.get("uri").and_then(Value::as_str) {
+                Some(uri) => read_uri(uri, self.folder.as_deref())?,
+                None if index > 0 => return Err("it has no uri; only buffer 0 may be the binary chunk".into()),
+                None => self.blob.clone().ok_or("it has no uri and the file no binary chunk")?,
+            };
+            // Numbers may begin like an archive by chance, but then there are enough of them.
+            let stand_in = if data.len() < length { lobelia_files::stand_in(&data) } else { lobelia_files::placeholder(&data) };
+            if let Some(what) = stand_in {
+                return Err(what);
+            }
+            if data.len() < length {
+                let what = if data.len() < 1024 { lobelia_files::describe(&data) } else { None };
+                let what = what.map(|what| format!(" ({what})")).unwrap_or_default();
+                return Err(format!("{length} bytes are declared, but only {} are there{what}", data.len()));
+            }
+            self.total.set(self.total.get().saturating_add(data.len()));
+            if self.total.get() > MAX_BYTES {
+                return Err(format!("the buffers have more than {MAX_BYTES} bytes"));
+            }
+            Ok(data)
+        };
+        let result = cell.get_or_init(read);
+        result.as_deref().map_err(|message| format!("buffer {index}: {message}"))
+    }
+
+    /// The bytes from an offset on in a buffer.
+    fn slice(&self, index: usize, offset: usize, length: usize) -> Result<&[u8], String> {
+        let buffer = self.buffer(index)?;
+        let end = offset.checked_add(length);
+        end.and_then(|end| buffer.get(offset..end)).ok_or_else(|| {
+            let end = offset.saturating_add(length);
+            format!("bytes {offset} to {end} lie outside of buffer {index}, which has {}", buffer.len())
         })
+    }
+
+    /// The bytes of the view of an index.
+    pub fn view(&self, index: usize) -> Result<&[u8], String> {
+        let Some(written) = self.raw.views.get(index) else {
+            return Err(format!("there is no buffer view {index}, but {}", self.raw.views.len()));
+        };
+        let fail = |message: String| format!("buffer view {index}: {message}");
+        if let Some(packed) = Packed::of(written) {
+            let unpack = || {
+                let packed = packed.map_err(fail)?;
+                let source = self.slice(packed.buffer, packed.offset, packed.length).map_err(fail)?;
+                packed.unpack(source).map_err(fail)
+            };
+            return self.unpacked[index].get_or_init(unpack).as_deref().map_err(Clone::clone);
+        }
+        let place = |key: &str| bytes_of(written, key);
+        let (buffer, offset, length) = match (place("buffer"), place("byteOffset"), place("byteLength")) {
+            (Ok(buffer), Ok(offset), Ok(length)) => (buffer, offset, length),
+            (Err(message), ..) | (_, Err(message), _) | (.., Err(message)) => return Err(fail(message)),
+        };
+        self.slice(buffer, offset, length).map_err(|message| if message.starts_with("buffer ") { message } else { fail(message) })
+    }
+
+    /// Bytes from one element to the next, if the view says so. 0 says nothing.
+    fn stride(&self, view: usize) -> Result<Option<usize>, String> {
+        let written = self.raw.views.get(view).ok_or_else(|| format!("there is no buffer view {view}"))?;
+        let stride = bytes_of(written, "byteStride").map_err(|message| format!("buffer view {view}: {message}"))?;
+        Ok(Some(stride).filter(|stride| *stride > 0))
+    }
+
+    /// The elements that Draco compressed, packed tightly in the types of the accessor; nothing if it is not one of those, or if the mesh cannot be
+    /// decoded and the accessor has bytes of its own.
+    fn draco(&self, accessor: &gltf::Accessor<'_>) -> Option<Result<Vec<u8>, String>> {
+        let part = self.raw.draco.get(&accessor.index())?;
+        let view = self.raw.draco_views[part.primitive];
+        let fail = |message: String| format!("buffer view {view}: it cannot be decoded with Draco: {message}");
+        match self.meshes[part.primitive].get_or_init(|| compressed::Draco::decode(self.view(view)?).map_err(fail)) {
+            Ok(mesh) => Some(mesh.elements(accessor, part.attribute).map_err(fail)),
+            Err(message) if accessor.view().is_some() => {
+                let warning = format!("{message}; the uncompressed mesh beside it is drawn");
+                let mut warnings = self.warnings.borrow_mut();
+                if !warnings.contains(&warning) {
+                    warnings.push(warning);
+                }
+                None
+            }
+            Err(message) => Some(Err(message.clone())),
+        }
     }
 
     /// Elements of an accessor, each as `width` numbers. Integers that are marked as normalised become [0, 1] or [-1, 1].
@@ -79,20 +194,30 @@ impl Buffers {
         if found != width {
             return Err(fail(format!("it has {found} numbers per element, but {width} are needed")));
         }
-        let view = accessor.view().ok_or_else(|| fail("it has no buffer view".into()))?;
         let component = accessor.data_type().size();
         let element = component * width;
-        let stride = view.stride().unwrap_or(element);
-        if stride < element {
-            return Err(fail(format!("its stride of {stride} bytes is less than an element of {element}")));
-        }
-        let layout = Layout { offset: accessor.offset(), stride, element, count: accessor.count() };
-        let bytes = self.run(shown, accessor, &view, layout)?;
         let number = |bytes: &[u8]| convert(accessor.data_type(), accessor.normalized(), bytes);
-        let mut values: Vec<T> = Vec::with_capacity(layout.count * width);
-        for start in (0..layout.count).map(|index| index * stride) {
-            values.extend(bytes[start..start + element].chunks_exact(component).map(number));
+        if let Some(unpacked) = self.draco(accessor) {
+            let bytes = unpacked.map_err(|message| SceneError::content(shown, message))?;
+            return Ok(bytes.chunks_exact(component).map(number).collect());
         }
+        let count = accessor.count();
+        let mut values: Vec<T> = match accessor.view() {
+            Some(view) => {
+                let stride = self.stride(view.index()).map_err(|message| SceneError::content(shown, message))?.unwrap_or(element);
+                if stride < element {
+                    return Err(fail(format!("its stride of {stride} bytes is less than an element of {element}")));
+                }
+                let bytes = self.run(shown, accessor, &view, Layout { offset: accessor.offset(), stride, element, count })?;
+                let starts = (0..count).map(|index| index * stride);
+                starts.flat_map(|start| bytes[start..start + element].chunks_exact(component)).map(number).collect()
+            }
+            // What has no bytes is zero (glTF 2.0, section 3.6.2.3).
+            None if count > MAX_ZEROS => {
+                return Err(fail(format!("it has {count} elements and no buffer view; at most {MAX_ZEROS} are read")));
+            }
+            None => vec![number(&[0; 4][..component]); count * width],
+        };
         if let Some(sparse) = accessor.sparse() {
             let count = sparse.count();
             let places = self.sparse_places(shown, accessor, &sparse)?;
@@ -126,7 +251,7 @@ impl Buffers {
     /// The bytes from the first to the last of a run of elements in a view.
     fn run(&self, shown: &str, accessor: &gltf::Accessor<'_>, view: &gltf::buffer::View<'_>, layout: Layout) -> Result<&[u8], SceneError> {
         let Layout { offset, stride, element, count } = layout;
-        let bytes = self.view(shown, view)?;
+        let bytes = self.view(view.index()).map_err(|message| SceneError::content(shown, message))?;
         let length = match count.checked_sub(1) {
             Some(last) => last.checked_mul(stride).and_then(|last| last.checked_add(element)),
             None => Some(0),

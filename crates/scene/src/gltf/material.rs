@@ -40,7 +40,8 @@ impl<'a> Written<'a> {
         Self::new(info.texture(), info.tex_coord(), info.extension_value("KHR_texture_transform"))
     }
 
-    fn reference(&self, sets: UvSets) -> TextureRef {
+    /// `image` is the index of the image among the textures of the scene.
+    fn reference(&self, image: usize, sets: UvSets) -> TextureRef {
         let wrap = |mode: gltf::texture::WrappingMode| match mode {
             gltf::texture::WrappingMode::Repeat => Wrap::Repeat,
             gltf::texture::WrappingMode::MirroredRepeat => Wrap::Mirror,
@@ -49,7 +50,7 @@ impl<'a> Written<'a> {
         let sampler = self.texture.sampler();
         let nearest = sampler.mag_filter() == Some(gltf::texture::MagFilter::Nearest);
         TextureRef {
-            texture: self.texture.source().index(),
+            texture: image,
             sampler: Sampler { wrap_u: wrap(sampler.wrap_s()), wrap_v: wrap(sampler.wrap_t()), nearest },
             uv_set: if sets.second == Some(self.set) { UvSet::Second } else { UvSet::First },
             uv_transform: self.transform,
@@ -94,9 +95,6 @@ impl Loader<'_> {
 
     fn material(&mut self, material: &gltf::Material<'_>) -> Result<Material, SceneError> {
         let name = material.name().map_or_else(|| format!("material {}", material.index().unwrap_or(0)), str::to_owned);
-        if material.occlusion_texture().is_some() {
-            self.warn("occlusion textures are ignored: light is computed, not painted");
-        }
         for (extension, lost) in extensions::lost_of_material(|extension| material.extension_value(extension)) {
             self.warn(format!("{extension} is not drawn: {lost}"));
         }
@@ -123,7 +121,8 @@ impl Loader<'_> {
 
     /// What it reflects, with all its textures; returns the alpha of the base colour.
     fn reflectance(&mut self, material: &gltf::Material<'_>, read: &mut Material) -> Result<f32, SceneError> {
-        let fail = |message: String| SceneError::content(self.shown, format!("material `{}`: {message}", read.name));
+        let (shown, name) = (self.shown, read.name.clone());
+        let fail = |message: String| SceneError::content(shown, format!("material `{name}`: {message}"));
         let glossy = if read.unlit { None } else { material.pbr_specular_glossiness() };
         let pbr = material.pbr_metallic_roughness();
         let (base, rough) = match &glossy {
@@ -154,9 +153,12 @@ impl Loader<'_> {
             ));
         }
         self.uv_sets.push(sets);
-        let [base, rough, normal, emissive] = written.map(|written| written.map(|written| written.reference(sets)));
-        (read.base_color_texture, read.metallic_roughness_texture, read.normal_texture, read.emissive_texture) =
-            (base, rough, normal, emissive);
+        let mut found = [None; 4];
+        for (found, written) in found.iter_mut().zip(&written) {
+            let Some(written) = written else { continue };
+            *found = self.image(written.texture.index(), &read.name)?.map(|image| written.reference(image, sets));
+        }
+        [read.base_color_texture, read.metallic_roughness_texture, read.normal_texture, read.emissive_texture] = found;
         if let Some(glossy) = glossy {
             return self.specular_glossiness(&glossy, read);
         }
@@ -164,6 +166,18 @@ impl Loader<'_> {
         (read.base_color, read.metallic, read.roughness) = (Vec3::new(red, green, blue), pbr.metallic_factor(), pbr.roughness_factor());
         self.dielectric(material, read)?;
         Ok(opacity)
+    }
+
+    /// The image of a texture. One that cannot be read is an error, or none where unsupported files are allowed.
+    fn image(&mut self, texture: usize, material: &str) -> Result<Option<usize>, SceneError> {
+        match self.images.of_texture(&self.buffers, texture) {
+            Ok(image) => Ok(Some(image)),
+            Err(message) if self.allow_unsupported => {
+                self.warn(format!("{message}; material `{material}` goes without it"));
+                Ok(None)
+            }
+            Err(message) => Err(self.fail(message)),
+        }
     }
 
     /// `KHR_materials_ior` and `KHR_materials_specular`.
@@ -228,7 +242,7 @@ impl Loader<'_> {
         }
         self.warn("specular-glossiness textures are converted to metallic and roughness: colours of dielectric reflections are lost");
         let factors = specular_glossiness::Factors { diffuse, specular, gloss };
-        let textures = std::sync::Arc::make_mut(&mut self.scene.textures);
+        let textures = &mut self.images.textures;
         let diffuse_texture = read.base_color_texture.map(|base| &textures[base.texture]);
         let [base, rough] = specular_glossiness::converted(factors, diffuse_texture, &textures[map.texture], &read.name);
         textures.extend([base, rough]);

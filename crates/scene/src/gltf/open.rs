@@ -1,9 +1,17 @@
-//! Parsing and validating a file's structure.
+//! From a file's bytes to a document that can be walked.
 //!
-//! The `gltf` crate's validation trusts a few things that a hostile file can break, and panics on them; those are checked here first.
+//! A file is read for what it draws: what nothing drawn reaches is replaced by a harmless stand-in before anything is validated ([`reach`]), and what is
+//! only rounded is clamped ([`round`]). The `gltf` crate's validation trusts a few things that a hostile file can break, and panics on them; those are
+//! checked here first.
 
+use super::{extensions, reach, round};
 use crate::SceneError;
-use gltf::json::{Root, mesh::Semantic, validation::Checked};
+use gltf::json::{
+    Path, Root,
+    mesh::Semantic,
+    validation::{Checked, Error as Problem, Validate},
+};
+use serde_json::Value;
 
 /// Size of a GLB header, bytes.
 const GLB_HEADER: usize = 12;
@@ -11,42 +19,85 @@ const GLB_HEADER: usize = 12;
 /// Most problems that one message lists.
 const MAX_LISTED: usize = 5;
 
-/// The document and its binary chunk.
-pub(crate) fn open(bytes: &[u8], shown: &str) -> Result<gltf::Gltf, SceneError> {
-    let fail = |message: String| SceneError::content(shown, message);
-    if bytes.starts_with(b"glTF") {
-        check_glb_length(bytes).map_err(fail)?;
-    }
-    let unchecked =
-        gltf::Gltf::from_slice_without_validation(bytes).map_err(|error| fail(format!("not a valid glTF 2.0 file: {error}")))?;
-    check_required_extensions(unchecked.document.as_json()).map_err(fail)?;
-    check_what_validation_trusts(unchecked.document.as_json()).map_err(fail)?;
-    let mut root = unchecked.document.into_json();
-    // What is required has been looked at; the validation knows fewer extensions.
-    root.extensions_required.clear();
-    let document = gltf::Document::from_json(root).map_err(|error| fail(explain(&error)))?;
-    Ok(gltf::Gltf { document, blob: unchecked.blob })
+/// A file, taken apart.
+pub(crate) struct Opened {
+    /// The document of what is drawn; its binary chunk is taken out.
+    pub gltf: gltf::Gltf,
+    /// The binary chunk.
+    pub blob: Option<Vec<u8>>,
+    /// What the document does not hold.
+    pub raw: reach::Raw,
+    /// What is not read or not as it stands.
+    pub warnings: Vec<String>,
 }
 
-fn check_glb_length(bytes: &[u8]) -> Result<(), String> {
-    let Some(&[a, b, c, d]) = bytes.get(8..GLB_HEADER) else {
+/// Opens a file; with `allow`, extensions that are required and cannot be read are a warning.
+pub(crate) fn open(bytes: &[u8], shown: &str, allow: bool) -> Result<Opened, SceneError> {
+    open_or_tell(bytes, allow).map_err(|message| SceneError::content(shown, message))
+}
+
+fn open_or_tell(bytes: &[u8], allow: bool) -> Result<Opened, String> {
+    let (json, blob) = if bytes.starts_with(b"glTF") { chunks(bytes)? } else { (bytes, None) };
+    let text = lobelia_files::text(json).map_err(|error| match error {
+        lobelia_files::NoText::Other(what) => what,
+        error @ lobelia_files::NoText::NotUtf8 { .. } => {
+            let what = lobelia_files::describe(json).unwrap_or_else(|| error.to_string());
+            format!("not a valid glTF 2.0 file: {what}")
+        }
+    })?;
+    // Chunks are padded, by some writers with zeros.
+    let mut root: Value = serde_json::from_str(
+        text.trim_end_matches(|character: char| character == '\0' || character.is_ascii_whitespace()),
+    )
+    .map_err(|error| {
+        let what = if text.trim_start().starts_with('{') { None } else { lobelia_files::describe(text.as_bytes()) };
+        format!("not a valid glTF 2.0 file: {}", what.unwrap_or_else(|| error.to_string()))
+    })?;
+    let mut warnings = extensions::check(&root, allow)?;
+    warnings.extend(round::round(&mut root));
+    let (raw, words) = reach::reduce(&mut root);
+    warnings.extend(words);
+    let root: Root = serde_json::from_value(root).map_err(|error| format!("not a valid glTF 2.0 file: {error}"))?;
+    check_what_validation_trusts(&root)?;
+    validate(&root)?;
+    let gltf = gltf::Gltf { document: gltf::Document::from_json_without_validation(root), blob: None };
+    Ok(Opened { gltf, blob, raw, warnings })
+}
+
+/// The JSON and the binary chunk of a GLB container; chunks of other kinds are skipped, as glTF 2.0 asks in section 4.4.3.
+fn chunks(bytes: &[u8]) -> Result<(&[u8], Option<Vec<u8>>), String> {
+    let word = |at: usize| bytes.get(at..at + 4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]));
+    let (Some(version), Some(declared)) = (word(4), word(8)) else {
         return Err(format!("a GLB header has {GLB_HEADER} bytes, but the file ends after {}", bytes.len()));
     };
-    let declared = u32::from_le_bytes([a, b, c, d]) as usize;
+    if version != 2 {
+        return Err(format!("not a valid glTF 2.0 file: unsupported version {version}"));
+    }
+    let declared = declared as usize;
     if declared < GLB_HEADER || declared > bytes.len() {
-        return Err(format!("its header declares {declared} bytes, but the file has {}: it is truncated or damaged", bytes.len()));
+        return Err(format!(
+            "its header declares {declared} bytes, but the file has {}: it is truncated or damaged, as by a download that ended early",
+            bytes.len()
+        ));
     }
-    Ok(())
-}
-
-fn check_required_extensions(root: &Root) -> Result<(), String> {
-    let unknown: Vec<&str> =
-        root.extensions_required.iter().map(String::as_str).filter(|name| !super::extensions::is_known(name)).collect();
-    if unknown.is_empty() {
-        return Ok(());
+    let (mut json, mut blob) = (None, None);
+    let mut at = GLB_HEADER;
+    while let (Some(length), Some(kind)) = (word(at), bytes.get(at + 4..at + 8)) {
+        if at >= declared {
+            break;
+        }
+        let end = (at + 8).checked_add(length as usize).filter(|end| *end <= bytes.len());
+        let end =
+            end.ok_or_else(|| format!("its chunk at byte {at} declares {length} bytes, which are not there: it is truncated or damaged"))?;
+        let chunk = &bytes[at + 8..end];
+        match kind {
+            b"JSON" if json.is_none() => json = Some(chunk),
+            b"BIN\0" if blob.is_none() => blob = Some(chunk.to_vec()),
+            _ => {}
+        }
+        at = end.next_multiple_of(4);
     }
-    let known = super::extensions::known().join(", ");
-    Err(format!("it requires {}, which this program cannot read; of extensions it reads {known}", unknown.join(", ")))
+    Ok((json.ok_or("not a valid glTF 2.0 file: a GLB container without a JSON chunk")?, blob))
 }
 
 fn check_what_validation_trusts(root: &Root) -> Result<(), String> {
@@ -83,21 +134,29 @@ fn check_what_validation_trusts(root: &Root) -> Result<(), String> {
             return Err(format!("camera {index}: its type is {kind}, but it has no `{kind}`"));
         }
     }
-    for (index, image) in root.images.iter().enumerate() {
-        match (&image.buffer_view, &image.uri) {
-            (Some(_), _) if image.mime_type.is_none() => return Err(format!("image {index}: it is in a buffer view, but has no mimeType")),
-            (None, None) => return Err(format!("image {index}: it has neither a uri nor a bufferView")),
-            _ => {}
-        }
-    }
     Ok(())
 }
 
-fn explain(error: &gltf::Error) -> String {
-    let gltf::Error::Validation(problems) = error else { return format!("not a valid glTF 2.0 file: {error}") };
-    let mut listed: Vec<String> = problems.iter().take(MAX_LISTED).map(|(path, problem)| format!("{path}: {problem}")).collect();
-    if problems.len() > MAX_LISTED {
-        listed.push(format!("and {} more", problems.len() - MAX_LISTED));
+/// The crate's validation, but for what is looked at elsewhere or not needed: extensions, accessors without a view, and the range of positions.
+fn validate(root: &Root) -> Result<(), String> {
+    let mut problems = Vec::new();
+    root.validate(root, Path::new, &mut |path, problem| {
+        let path = path();
+        let place = path.as_str();
+        let needless = place.starts_with("extensionsRequired")
+            || (problem == Problem::Missing && place.starts_with("accessors[") && place.ends_with("].bufferView"))
+            || (problem != Problem::IndexOutOfBounds && place.contains("POSITION"));
+        if !needless {
+            problems.push(format!("{place}: {problem}"));
+        }
+    });
+    if problems.is_empty() {
+        return Ok(());
     }
-    format!("not a valid glTF 2.0 file: {}", listed.join("; "))
+    if problems.len() > MAX_LISTED {
+        let more = problems.len() - MAX_LISTED;
+        problems.truncate(MAX_LISTED);
+        problems.push(format!("and {more} more"));
+    }
+    Err(format!("not a valid glTF 2.0 file: {}", problems.join("; ")))
 }

@@ -30,7 +30,7 @@ fn truncated_at_every_length() {
 
 #[test]
 fn wrong_containers() {
-    refused_bytes(b"", "not a valid glTF 2.0 file");
+    refused_bytes(b"", "the file is empty");
     refused_bytes(b"hello", "not a valid glTF 2.0 file");
     refused_bytes(b"glTF\x02\0\0\0\x03\0\0\0", "its header declares 3 bytes");
     refused_bytes(b"glTF\x01\0\0\0\x0c\0\0\0", "unsupported version");
@@ -51,8 +51,8 @@ fn a_scene_must_have_something_to_draw() {
 #[test]
 fn required_extensions_are_named() {
     let mut glb = Glb::triangle();
-    glb.json["extensionsRequired"] = json!(["KHR_draco_mesh_compression", "KHR_lights_punctual"]);
-    refused(&glb, "it requires KHR_draco_mesh_compression, which this program cannot read");
+    glb.json["extensionsRequired"] = json!(["ACME_clay", "KHR_lights_punctual"]);
+    refused(&glb, "it requires ACME_clay, which this program cannot read; `--allow-unsupported` reads it without");
 }
 
 #[test]
@@ -72,15 +72,18 @@ fn accessors_beyond_their_buffers() {
     refused(&set(0, "type", json!("VEC2")), "accessor 0: it has 2 numbers per element, but 3 are needed");
     refused(&set(3, "componentType", json!(5126)), "accessor 3: indices must be unsigned integers");
     refused(&set(0, "bufferView", json!(77)), "Index out of bounds");
-    refused(&set(0, "bufferView", Value::Null), "accessors[0].bufferView: Missing data");
-    refused(&set(0, "min", Value::Null), "min");
+    // Zeros, all in one point.
+    refused(&set(0, "bufferView", Value::Null), "the scene is empty");
+    let mut zeros = set(0, "bufferView", Value::Null);
+    zeros.json["accessors"][0]["count"] = json!(4_000_000_000u64);
+    refused(&zeros, "accessor 0: it has 4000000000 elements and no buffer view; at most 16777216 are read");
     let mut glb = Glb::square(json!({}));
     glb.json["bufferViews"][0]["byteStride"] = json!(4);
     refused(&glb, "accessor 0: its stride of 4 bytes is less than an element of 12");
     glb.json["bufferViews"][0]["byteStride"] = json!(252);
     refused(&glb, "do not fit");
     glb.json["bufferViews"][0]["byteStride"] = json!(u64::MAX);
-    refused(&glb, "bufferViews[0].byteStride: Invalid value");
+    refused(&glb, "do not fit");
     let mut glb = Glb::square(json!({}));
     glb.json["bufferViews"][1]["byteOffset"] = json!(100_000);
     refused(&glb, "buffer view 1: bytes 100000 to 100048 lie outside of buffer 0");
@@ -107,7 +110,10 @@ fn indices_out_of_range() {
         let mut glb = Glb::square(json!({}));
         *glb.json.pointer_mut(pointer).unwrap() = value;
         let error = glb.error();
-        assert!(error.contains("out of bounds") || error.contains("accessor 9, but there are 4"), "{pointer}: {error}");
+        assert!(
+            ["out of bounds", "accessor 9, but there are 4", "no buffer 9"].iter().any(|words| error.contains(words)),
+            "{pointer}: {error}"
+        );
     }
     let mut glb = Glb::triangle();
     glb.json["nodes"][0]["extensions"] = json!({"KHR_lights_punctual": {"light": 3}});
@@ -240,7 +246,9 @@ fn buffers_that_are_not_there() {
     glb.json["buffers"] = json!([{"byteLength": 1_000_000}]);
     refused(&glb, "buffer 0: 1000000 bytes are declared, but only");
     glb.json["buffers"] = json!([{"byteLength": 36}, {"byteLength": 36}]);
+    glb.json["bufferViews"][0]["buffer"] = json!(1);
     refused(&glb, "buffer 1: it has no uri; only buffer 0 may be the binary chunk");
+    glb.json["bufferViews"][0]["buffer"] = json!(0);
     glb.json["buffers"] = json!([{"byteLength": 36, "uri": "nowhere.bin"}]);
     refused(&glb, "nowhere.bin: cannot be read");
     glb.json["buffers"] = json!([{"byteLength": 36, "uri": "data:base64,AAAA"}]);
@@ -290,13 +298,13 @@ fn images_that_are_none() {
     glb.json["images"] = json!([{}]);
     refused(&glb, "image 0: it has neither a uri nor a bufferView");
     glb.json["images"] = json!([{"bufferView": 0}]);
-    refused(&glb, "image 0: it is in a buffer view, but has no mimeType");
+    refused(&glb, "image 0: `image 0`: it cannot be decoded");
 }
 
 #[test]
 fn many_large_images_are_refused_before_they_are_decoded() {
     // A real image of the largest size would take long to make; its claim is enough, for the sum is looked at first.
-    let mut glb = Glb::square(json!({"emissiveTexture": {"index": 0}}));
+    let mut glb = Glb::square(json!({"emissiveTexture": {"index": 1}, "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}));
     glb.texture(&png(1, 1, &[0; 4]), json!({}));
     glb.texture(&claim(8192, 8192), json!({}));
     refused(&glb, "image 1: `image 1`: it cannot be decoded");
@@ -324,7 +332,7 @@ fn lights_out_of_range() {
     for (light, expected) in [
         (json!({"type": "point", "intensity": -1}), "light `lamp`: its intensity is [-1, -1, -1]"),
         (json!({"type": "point", "intensity": 1e300}), "must be finite"),
-        (json!({"type": "spot", "spot": {"innerConeAngle": 0.5, "outerConeAngle": 0.2}}), "light `lamp`: its cone angles are 0.5 and 0.2"),
+        (json!({"type": "spot", "spot": {"innerConeAngle": 0.0, "outerConeAngle": 0.0}}), "light `lamp`: its cone angles are 0 and 0"),
         (json!({"type": "spot", "spot": {"innerConeAngle": 0.5, "outerConeAngle": 2.0}}), "0 <= inner <= outer <= pi/2 must hold"),
         (json!({"type": "spot"}), "spot"),
         (json!({"type": "laser"}), "type"),

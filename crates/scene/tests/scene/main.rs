@@ -4,6 +4,7 @@
 mod animation;
 mod area_lights;
 mod builtin;
+mod compressed;
 mod conventions;
 mod fuzz;
 mod glb;
@@ -13,3 +14,4 @@ mod materials;
 mod posing;
 mod ron;
 mod shared;
+mod usable;
