@@ -187,7 +187,8 @@ fn the_device_and_the_path_tracer_agree_about_every_card() {
     println!("cards differ by {card:.4}, pixels by {pixel:.4} of the mean");
     assert!(card < 0.02 && pixel < 0.06, "cards differ by {card:.4}, pixels by {pixel:.4} of the mean");
     // The bounds are no formality: a scene that lacks any one of these things is told apart.
-    let changes: [(&str, &dyn Fn(&mut Scene)); 6] = [
+    type Change<'a> = &'a dyn Fn(&mut Scene);
+    let changes: [(&str, Change<'_>); 6] = [
         ("vertex colours", &|scene| Arc::make_mut(&mut scene.meshes)[0].colors = vec![Vec4::ONE; 4]),
         ("transform", &|scene| scene.materials[1].base_color_texture.as_mut().unwrap().uv_transform = glam::Affine2::IDENTITY),
         ("second set", &|scene| scene.materials[2].base_color_texture.as_mut().unwrap().uv_set = lobelia::scene::UvSet::First),
