@@ -192,7 +192,7 @@ fn the_device_and_the_path_tracer_agree_about_every_card() {
     }
     let (card, pixel) = difference(&truth, &drawn);
     println!("cards differ by {card:.4}, pixels by {pixel:.4} of the mean");
-    assert!(card < 0.02 && pixel < 0.06, "cards differ by {card:.4}, pixels by {pixel:.4} of the mean");
+    assert!(card < 0.02 && pixel < 0.03, "cards differ by {card:.4}, pixels by {pixel:.4} of the mean");
     // The bounds are no formality: a scene that lacks any one of these things is told apart.
     let changes: [(&str, &dyn Fn(&mut Scene)); 6] = [
         ("vertex colours", &|scene| Arc::make_mut(&mut scene.meshes)[0].colors = vec![Vec4::ONE; 4]),
@@ -207,6 +207,6 @@ fn the_device_and_the_path_tracer_agree_about_every_card() {
         change(&mut other);
         let (card, pixel) = difference(&traced(&other), &drawn);
         println!("without {name}: cards {card:.4}, pixels {pixel:.4}");
-        assert!(card > 0.02 || pixel > 0.06, "{name}: cards differ by {card:.4}, pixels by {pixel:.4} only");
+        assert!(card > 0.02 || pixel > 0.03, "{name}: cards differ by {card:.4}, pixels by {pixel:.4} only");
     }
 }
