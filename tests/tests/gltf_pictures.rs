@@ -183,9 +183,16 @@ fn the_device_and_the_path_tracer_agree_about_every_card() {
     let render = Render { graph: "direct.ron", scene: address, variants: &[], set: &[], ndf: Ndf::Ggx, shot };
     let drawn = render.radiance("sum.radiance").unwrap();
     let truth = traced(&scene);
+    for card in 0..8 {
+        let mean = |image: &Image| {
+            let pixels: Vec<usize> = (0..image.pixels.len()).filter(|pixel| pixel % EXTENT[0] as usize / 16 == card).collect();
+            [0, 1, 2].map(|channel| pixels.iter().map(|pixel| image.pixels[*pixel][channel]).sum::<f32>() / pixels.len() as f32)
+        };
+        println!("card {card}: {:.4?} {:.4?}", mean(&truth), mean(&drawn));
+    }
     let (card, pixel) = difference(&truth, &drawn);
     println!("cards differ by {card:.4}, pixels by {pixel:.4} of the mean");
-    assert!(card < 0.02 && pixel < 0.06, "cards differ by {card:.4}, pixels by {pixel:.4} of the mean");
+    assert!(card < 0.02 && pixel < 0.03, "cards differ by {card:.4}, pixels by {pixel:.4} of the mean");
     // The bounds are no formality: a scene that lacks any one of these things is told apart.
     type Change<'a> = &'a dyn Fn(&mut Scene);
     let changes: [(&str, Change<'_>); 6] = [
@@ -201,6 +208,6 @@ fn the_device_and_the_path_tracer_agree_about_every_card() {
         change(&mut other);
         let (card, pixel) = difference(&traced(&other), &drawn);
         println!("without {name}: cards {card:.4}, pixels {pixel:.4}");
-        assert!(card > 0.02 || pixel > 0.06, "{name}: cards differ by {card:.4}, pixels by {pixel:.4} only");
+        assert!(card > 0.02 || pixel > 0.03, "{name}: cards differ by {card:.4}, pixels by {pixel:.4} only");
     }
 }

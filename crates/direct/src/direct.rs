@@ -5,7 +5,6 @@ use lobelia_graph::{
     BuildError, ClaimOf, ComputePipeline, CreateContext, DeviceOf, Frame, InputShapes, Need, OutputShapes, ParamValue, Pass, PlanContext,
     PortError, Ports, RunError, Specialisation, TraitsOf,
 };
-use lobelia_scene::Ndf;
 use lobelia_shaders::Source;
 use serde::{Deserialize, Serialize};
 
@@ -74,18 +73,6 @@ pub struct Bindings {
     workgroups: [u32; 2],
 }
 
-/// The flags that decide how light reflects, with their reasons: shared by every pass that evaluates reflectance.
-fn reflectance_flags(specular: bool, normal_map: bool, ndf: Ndf) -> Vec<Specialisation> {
-    let specular_reason = if specular { "a material has a specular lobe" } else { "no material has a specular lobe: the lobe is dropped" };
-    let normal_reason = if normal_map { "a material has a normal map" } else { "no material has a normal map: the side test is dropped" };
-    let phong = specular && ndf == Ndf::Phong;
-    vec![
-        Specialisation::new("SPECULAR", specular, specular_reason),
-        Specialisation::new("NORMAL_MAP", normal_map, normal_reason),
-        Specialisation::new("NDF_PHONG", phong, format!("the scene's distribution is {ndf}")),
-    ]
-}
-
 impl Pass for DirectPass {
     const NAME: &'static str = "direct";
     const DOC: &'static str = "Direct light of point, spot and directional lights, shadowed by their maps.\n\
@@ -107,7 +94,7 @@ impl Pass for DirectPass {
 
     fn specialise(context: &PlanContext<'_, Self>, inputs: &InputShapes<Self>) -> Vec<Specialisation> {
         let flags = inputs.gbuffer.flags;
-        let mut found = reflectance_flags(flags.specular, flags.normal_map, context.traits.ndf);
+        let mut found = flags.reflectance(context.traits.ndf);
         let shadows = inputs.rsm.is_some();
         found.push(Specialisation::new(
             "SHADOWS",
