@@ -32,6 +32,8 @@ pub struct PassEntry {
     pub params: Vec<(Spanned, Spanned)>,
     /// Explicit wiring: input port and `pass.port` texts.
     pub from: Vec<(Spanned, Vec<Spanned>)>,
+    /// Whether a variant has taken it out.
+    pub(crate) removed: bool,
 }
 
 /// What a variant puts in the place of a pass.
@@ -66,6 +68,10 @@ pub struct GraphFile {
     pub output: Spanned,
     /// Variants in the order of the file.
     pub variants: Vec<(Spanned, Vec<Replacement>)>,
+    /// What is wrong with it as it is written, where the rest can still be read: told with whatever else is wrong when the graph is wired.
+    pub(crate) faults: Vec<Problem>,
+    /// Names of passes that could not be read; what follows from that is not told.
+    pub(crate) unread: Vec<String>,
 }
 
 /// RON as graph files use it: `Some` need not be written.
@@ -126,6 +132,8 @@ impl<'de> Deserialize<'de> for Items<'de> {
 struct Reader<'a> {
     text: &'a str,
     problems: Vec<Problem>,
+    /// Names of passes that could not be read.
+    unread: Vec<String>,
 }
 
 impl<'a> Reader<'a> {
@@ -159,7 +167,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Named values with their places; duplicate names are reported.
+    /// Named values with their places; duplicate names are reported, and the first counts.
     fn entries(&mut self, slice: &'a str, what: &str) -> Vec<(Spanned, &'a RawValue)> {
         let Some(Entries(entries)) = self.read::<Entries<'a>>(slice) else { return Vec::new() };
         let named: Vec<_> = entries.into_iter().map(|(name, value)| (self.name_before(&name, value), value)).collect();
@@ -171,7 +179,8 @@ impl<'a> Reader<'a> {
                 );
             }
         }
-        named
+        let mut seen = std::collections::HashSet::new();
+        named.into_iter().filter(|(name, _)| seen.insert(name.text.clone())).collect()
     }
 
     /// A name that `pass.port` and `pass.param=value` could not tell from what follows it is refused.
@@ -194,11 +203,12 @@ impl<'a> Reader<'a> {
         if kind_text.is_empty() {
             let help = "write the kind of pass before its parameters: \"name\": gbuffer(...)";
             self.problems.push(Problem::at(self.span(text), format!("pass `{}` has no kind", name.text)).help(help));
+            self.unread.push(name.text);
             return None;
         }
         let kind = Spanned { text: kind_text.to_owned(), span: self.span(&text[..kind_end]) };
         let body = text[kind_end..].trim();
-        let mut entry = PassEntry { name, kind, params: Vec::new(), from: Vec::new() };
+        let mut entry = PassEntry { name, kind, params: Vec::new(), from: Vec::new(), removed: false };
         if body.is_empty() {
             return Some(entry);
         }
@@ -275,9 +285,10 @@ impl GraphFile {
         }
     }
 
-    /// Takes apart `text`; `path` is only shown.
+    /// Takes apart `text`; `path` is only shown. Where passes and output can be told, what else is wrong waits for [`GraphFile::wire`] or [`GraphFile::check`], which
+    /// tell all mistakes of the file at once.
     pub fn parse(text: &str, path: &str) -> Result<Self, Problems> {
-        let mut reader = Reader { text, problems: Vec::new() };
+        let mut reader = Reader { text, problems: Vec::new(), unread: Vec::new() };
         let mut passes = Vec::new();
         let mut output = None;
         let mut variants = Vec::new();
@@ -324,11 +335,12 @@ impl GraphFile {
             let help = "add `output: \"pass.port\"` after the passes";
             reader.problems.push(Problem::at(0..0, "the graph does not say what its `output` is").help(help));
         }
+        let Reader { problems, unread, .. } = reader;
         match output {
-            Some(output) if reader.problems.is_empty() => {
-                Ok(Self { path: path.to_owned(), text: text.to_owned(), passes, output, variants })
+            Some(output) if seen_passes => {
+                Ok(Self { path: path.to_owned(), text: text.to_owned(), passes, output, variants, faults: problems, unread })
             }
-            _ => Err(Problems { file: path.to_owned(), text: text.to_owned(), problems: reader.problems }),
+            _ => Err(Problems { file: path.to_owned(), text: text.to_owned(), problems }),
         }
     }
 

@@ -84,7 +84,8 @@ pub struct Wired<W: World> {
 impl GraphFile {
     /// Applies variants and overrides and checks everything that can be checked without a scene. All problems are reported at once.
     pub fn wire<W: World>(&self, registry: &Registry<W>, variants: &[String], overrides: &[Override]) -> Result<Wired<W>, Problems> {
-        let mut problems = self.check_variant_names();
+        let mut problems = self.faults.clone();
+        problems.extend(self.check_variant_names());
         let mut entries = self.passes.clone();
         for wanted in variants {
             match self.variants.iter().find(|(name, _)| name.text == *wanted) {
@@ -98,26 +99,66 @@ impl GraphFile {
                 }
             }
         }
+        let removed = take_removed(&mut entries);
+        let mut output = self.output.clone();
+        forward_removed(registry, &mut entries, &removed, &mut output);
         let overridden = check_override_names(&self.path, &entries, overrides, &mut problems);
+        // Wiring goes on without the passes that nobody knows, so that every other mistake is told too; what only follows from theirs is not.
+        let (known, unknown): (Vec<PassEntry>, Vec<PassEntry>) =
+            entries.into_iter().partition(|entry| registry.find(&entry.kind.text).is_some());
+        for entry in &unknown {
+            problems.push(unknown_kind(registry, entry));
+        }
         let mut passes: Vec<WiredPass<W>> = Vec::new();
-        let mut unknown = false;
-        for entry in &entries {
+        let mut entries = Vec::new();
+        let mut unknown: Vec<&str> = unknown.iter().map(|entry| &entry.name.text).chain(&self.unread).map(String::as_str).collect();
+        for entry in &known {
             match resolve_pass(self, registry, entry, &overridden, &mut problems) {
-                Some(pass) => passes.push(pass),
-                None => unknown = true,
+                Some(pass) => {
+                    passes.push(pass);
+                    entries.push(entry);
+                }
+                None => unknown.push(&entry.name.text),
             }
         }
-        if unknown || passes.len() != entries.len() {
-            // With a pass missing, wiring would only repeat the same complaint.
-            return Err(self.fail(problems));
-        }
-        Wiring { registry, entries: &entries, passes: &mut passes, problems: &mut problems }.run();
+        let names = Names { unknown, removed: removed.iter().map(|entry| entry.name.text.as_str()).collect() };
+        Wiring { registry, entries: &entries, passes: &mut passes, problems: &mut problems, names: &names, meant: Vec::new() }.run();
         find_cycles(&passes, &mut problems);
-        let output = find_output(&passes, &self.output, &mut problems);
+        let output = find_output(&passes, &names, &output, &mut problems);
         match output {
             Some(output) if problems.is_empty() => Ok(Wired { file: self.clone(), passes, output, variants: variants.to_vec() }),
             _ => Err(self.fail(problems)),
         }
+    }
+
+    /// Checks the base and every variant, and gives the number of variants. `plan` looks at each that is well wired, to plan it for a scene, say. All mistakes of
+    /// the file come at once, each once: one of the base that a variant leaves in place is not told again for the variant.
+    pub fn check<W: World>(
+        &self,
+        registry: &Registry<W>,
+        plan: &mut dyn FnMut(&Wired<W>) -> Result<(), Problems>,
+    ) -> Result<usize, Problems> {
+        let mut found: Vec<Problem> = Vec::new();
+        let mut seen: Vec<(Option<Range<usize>>, String)> = Vec::new();
+        for variant in std::iter::once(None).chain(self.variant_names().map(Some)) {
+            let variants: Vec<String> = variant.iter().map(|name| (*name).to_owned()).collect();
+            let Err(problems) = self.wire(registry, &variants, &[]).and_then(|wired| plan(&wired)) else { continue };
+            for mut problem in problems.problems {
+                // What follows names candidates, which differ from variant to variant.
+                let subject = problem.message.split_once(": ").map_or(problem.message.as_str(), |(subject, _)| subject).to_owned();
+                let key = (problem.span.clone(), subject);
+                if seen.contains(&key) {
+                    continue;
+                }
+                // A place in the base may be right without the variant, so the variant is named.
+                if let Some(variant) = variant {
+                    problem.message = format!("variant `{variant}`: {}", problem.message);
+                }
+                seen.push(key);
+                found.push(problem);
+            }
+        }
+        if found.is_empty() { Ok(self.variants.len()) } else { Err(self.fail(found)) }
     }
 
     /// Why an override fits no pass of the graph with these variants: it has no such pass, or the pass no such parameter. `None` if it fits, or if that cannot be
@@ -127,6 +168,7 @@ impl GraphFile {
         for (_, replacements) in self.variants.iter().filter(|(name, _)| variants.contains(&name.text)) {
             apply_variant(&mut entries, replacements);
         }
+        take_removed(&mut entries);
         let Some(entry) = entries.iter().find(|entry| entry.name.text == item.pass) else {
             return Some(format!("has no pass `{}`", item.pass));
         };
@@ -140,7 +182,7 @@ impl GraphFile {
         let mut problems = Vec::new();
         for (variant, replacements) in &self.variants {
             for name in replacements.iter().map(Replacement::name) {
-                if !self.passes.iter().any(|pass| pass.name.text == name.text) {
+                if !self.passes.iter().any(|pass| pass.name.text == name.text) && !self.unread.contains(&name.text) {
                     let near = nearest(&name.text, self.passes.iter().map(|pass| pass.name.text.as_str()));
                     problems.push(
                         Problem::at(
@@ -156,16 +198,78 @@ impl GraphFile {
     }
 }
 
-fn apply_variant(entries: &mut Vec<PassEntry>, replacements: &[Replacement]) {
+/// Names of passes that are not there to be wired.
+struct Names<'a> {
+    /// Their own mistakes are told; what follows from them is not.
+    unknown: Vec<&'a str>,
+    /// Taken out by a variant, where nothing could be handed on in their place.
+    removed: Vec<&'a str>,
+}
+
+/// What a variant makes of the entries. A pass that is taken out stays, marked as such, until [`take_removed`]: a later variant may put it back.
+fn apply_variant(entries: &mut [PassEntry], replacements: &[Replacement]) {
     for replacement in replacements {
-        let Some(index) = entries.iter().position(|entry| entry.name.text == replacement.name().text) else { continue };
+        let Some(entry) = entries.iter_mut().find(|entry| entry.name.text == replacement.name().text) else { continue };
         match replacement {
-            Replacement::Pass(entry) => entries[index] = entry.clone(),
-            Replacement::Remove(_) => {
-                entries.remove(index);
+            Replacement::Pass(other) => *entry = other.clone(),
+            Replacement::Remove(_) => entry.removed = true,
+        }
+    }
+}
+
+/// Takes out the passes that variants removed, and gives them back.
+fn take_removed(entries: &mut Vec<PassEntry>) -> Vec<PassEntry> {
+    let (removed, kept) = std::mem::take(entries).into_iter().partition(|entry| entry.removed);
+    *entries = kept;
+    removed
+}
+
+/// Whoever names an output of a removed pass gets what that pass would have read, if it has just one input of that type and that is fed by one pass: a filter that
+/// is taken out of a chain hands its input on. Where there is no such input the name stays as it is and is told to be gone.
+fn forward_removed<W: World>(registry: &Registry<W>, entries: &mut [PassEntry], removed: &[PassEntry], output: &mut Spanned) {
+    let others = entries.to_vec();
+    let texts = entries.iter_mut().flat_map(|entry| entry.from.iter_mut().flat_map(|(_, sources)| sources.iter_mut()));
+    for text in texts.chain(std::iter::once(output)) {
+        // A chain of removed passes is followed to its beginning; one that leads back to itself has none.
+        for _ in 0..removed.len() {
+            match handed_on(registry, &others, removed, &text.text) {
+                Some(source) => text.text = source,
+                None => break,
             }
         }
     }
+}
+
+/// `pass.port` of what the removed pass in `text` would have read where its output is read.
+fn handed_on<W: World>(registry: &Registry<W>, others: &[PassEntry], removed: &[PassEntry], text: &str) -> Option<String> {
+    let (name, port) = text.split_once('.').map_or((text, None), |(pass, port)| (pass, Some(port)));
+    let entry = removed.iter().find(|entry| entry.name.text == name)?;
+    let info = registry.info(&entry.kind.text)?;
+    let made = match port {
+        Some(port) => info.outputs.iter().find(|output| output.name == port)?,
+        None => info.outputs.first().filter(|_| info.outputs.len() == 1)?,
+    };
+    let mut inputs = info.inputs.iter().filter(|input| input.resource == made.resource && !input.history);
+    let (input, None) = (inputs.next()?, inputs.next()) else { return None };
+    if let Some((_, sources)) = entry.from.iter().find(|(port, _)| port.text == input.name) {
+        return sources.first().filter(|_| sources.len() == 1).map(|source| source.text.clone());
+    }
+    // It would have been wired by type; the pass that reads it does not count, since it comes after.
+    let reads_it =
+        |other: &PassEntry| other.from.iter().flat_map(|(_, sources)| sources).any(|source| source.text.split('.').next() == Some(name));
+    let mut producers = others.iter().filter(|other| !reads_it(other)).flat_map(|other| {
+        let outputs = registry.info(&other.kind.text).map(|info| info.outputs.as_slice()).unwrap_or_default();
+        outputs.iter().filter(|output| output.resource == made.resource).map(|output| format!("{}.{}", other.name.text, output.name))
+    });
+    let (producer, None) = (producers.next()?, producers.next()) else { return None };
+    Some(producer)
+}
+
+fn unknown_kind<W: World>(registry: &Registry<W>, entry: &PassEntry) -> Problem {
+    let near = registry.nearest(&entry.kind.text).map(|near| format!("did you mean `{}`?", near.replace('-', "_")));
+    let help = near.unwrap_or_else(|| "`lobelia passes` lists them all".into());
+    let what = format!("pass `{}`: no kind of pass is called `{}`", entry.name.text, entry.kind.text);
+    Problem::at(entry.kind.span.clone(), what).help(help)
 }
 
 /// Keeps the overrides that name a pass of the graph.
@@ -198,15 +302,7 @@ fn resolve_pass<W: World>(
     overrides: &[&Override],
     problems: &mut Vec<Problem>,
 ) -> Option<WiredPass<W>> {
-    let Some(kind) = registry.find(&entry.kind.text) else {
-        let near = registry.nearest(&entry.kind.text).map(|near| format!("did you mean `{}`?", near.replace('-', "_")));
-        let help = near.unwrap_or_else(|| "`lobelia passes` lists them all".into());
-        problems.push(
-            Problem::at(entry.kind.span.clone(), format!("pass `{}`: no kind of pass is called `{}`", entry.name.text, entry.kind.text))
-                .help(help),
-        );
-        return None;
-    };
+    let kind = registry.find(&entry.kind.text)?;
     let params = resolve_params(file, kind.as_ref(), entry, overrides, problems)?;
     let inputs = kind.info().inputs.len();
     Some(WiredPass {
@@ -219,7 +315,8 @@ fn resolve_pass<W: World>(
     })
 }
 
-/// Reads parameters one at a time, so that each fault has its own place, then all together.
+/// Reads parameters one at a time, so that each fault has its own place, then those that are right together: a pass with a wrong one can still be wired, and its
+/// other parameters can still be out of range. `None` where not even that could be read.
 fn resolve_params<W: World>(
     file: &GraphFile,
     kind: &dyn Kind<W>,
@@ -267,14 +364,13 @@ fn resolve_params<W: World>(
         values.retain(|(existing, ..)| *existing != name);
         values.push((name, item.value.clone(), None));
     }
-    if problems.len() > before {
-        return None;
-    }
     let all = values.iter().map(|(name, value, _)| format!("{name}:{value}")).collect::<Vec<_>>().join(",");
     let params = match kind.parse(&format!("({all})")) {
         Ok(params) => params,
         Err(error) => {
-            problems.push(Problem::at(entry.name.span.clone(), format!("pass `{pass}`: {}", error.code)));
+            if problems.len() == before {
+                problems.push(Problem::at(entry.name.span.clone(), format!("pass `{pass}`: {}", error.code)));
+            }
             return None;
         }
     };
@@ -286,7 +382,7 @@ fn resolve_params<W: World>(
             None => Problem::on_command_line(format!("--set {pass}.{}: {}", problem.name, problem.message)).maybe_help(help),
         });
     }
-    (problems.len() == before).then_some(params)
+    Some(params)
 }
 
 fn value_problem<W: World>(
@@ -332,13 +428,31 @@ fn param_help<W: World>(kind: &dyn Kind<W>, name: &str) -> Option<String> {
     Some(format!("`{name}` is {}{unit}{range}; its default is {}", param.kind, param.default))
 }
 
-fn find_output<W: World>(passes: &[WiredPass<W>], output: &Spanned, problems: &mut Vec<Problem>) -> Option<PortRef> {
+fn find_output<W: World>(passes: &[WiredPass<W>], names: &Names<'_>, output: &Spanned, problems: &mut Vec<Problem>) -> Option<PortRef> {
     match find_port(passes, &output.text) {
         Ok(found) => Some(found),
+        Err(_) if names.is_unknown(&output.text) => None,
         Err(help) => {
+            let help = names.removed_help(&output.text).unwrap_or(help);
             problems.push(Problem::at(output.span.clone(), format!("output: there is no `{}` in this graph", output.text)).help(help));
             None
         }
+    }
+}
+
+impl Names<'_> {
+    fn is_unknown(&self, text: &str) -> bool {
+        self.unknown.contains(&text.split('.').next().unwrap_or_default())
+    }
+
+    /// Why a pass that was taken out left nothing in its place.
+    fn removed_help(&self, text: &str) -> Option<String> {
+        let name = text.split('.').next().unwrap_or_default();
+        self.removed.contains(&name).then(|| {
+            format!(
+                "the variant takes `{name}` out, which has no single input of that type to hand on; name another producer in the variant"
+            )
+        })
     }
 }
 
@@ -384,9 +498,13 @@ impl<W: World> Wired<W> {
 
 struct Wiring<'a, W: World> {
     registry: &'a Registry<W>,
-    entries: &'a [PassEntry],
+    /// Those of `passes`, in the same order.
+    entries: &'a [&'a PassEntry],
     passes: &'a mut Vec<WiredPass<W>>,
     problems: &'a mut Vec<Problem>,
+    names: &'a Names<'a>,
+    /// Readers and producers of wires that are written but wrong. They count as dependencies, so that a mistake does not make other wires ambiguous.
+    meant: Vec<(usize, usize)>,
 }
 
 impl<W: World> Wiring<'_, W> {
@@ -412,7 +530,7 @@ impl<W: World> Wiring<'_, W> {
         let kind = self.passes[index].kind.clone();
         let inputs = &kind.info().inputs;
         let pass_name = self.passes[index].name.clone();
-        for (port_name, sources) in &self.entries[index].from {
+        for (port_name, sources) in &self.entries[index].from.clone() {
             let Some(port_index) = inputs.iter().position(|port| port.name == port_name.text) else {
                 let listed = inputs.iter().map(|port| port.name).collect::<Vec<_>>().join(", ");
                 let help = match nearest(&port_name.text, inputs.iter().map(|port| port.name)) {
@@ -429,7 +547,7 @@ impl<W: World> Wiring<'_, W> {
             self.passes[index].port_spans[port_index] = port_name.span.clone();
             self.check_count(&pass_name, port, port_name, sources.len());
             for source in sources {
-                if let Some(found) = self.check_source(&pass_name, port, source) {
+                if let Some(found) = self.check_source(index, &pass_name, port, source) {
                     self.passes[index].sources[port_index].push(found);
                 }
             }
@@ -446,9 +564,16 @@ impl<W: World> Wiring<'_, W> {
         self.problems.push(Problem::at(place.span.clone(), what));
     }
 
-    fn check_source(&mut self, pass: &str, port: &PortInfo, source: &Spanned) -> Option<PortRef> {
+    fn check_source(&mut self, index: usize, pass: &str, port: &PortInfo, source: &Spanned) -> Option<PortRef> {
         match find_port(self.passes, &source.text) {
+            Err(_) if self.names.is_unknown(&source.text) => None,
             Err(help) => {
+                let help = self.names.removed_help(&source.text).unwrap_or(help);
+                let name = source.text.split('.').next().unwrap_or_default();
+                let near = nearest(name, self.passes.iter().map(|pass| pass.name.as_str()));
+                if let Some(meant) = self.passes.iter().position(|pass| Some(pass.name.as_str()) == near) {
+                    self.meant.push((index, meant));
+                }
                 let what =
                     format!("pass `{pass}`, port `{}: {}`: there is no `{}` in this graph", port.name, port.resource.name, source.text);
                 self.problems.push(Problem::at(source.span.clone(), what).help(help));
@@ -459,6 +584,7 @@ impl<W: World> Wiring<'_, W> {
                 if made == port.resource {
                     return Some(found);
                 }
+                self.meant.push((index, found.pass));
                 let fitting = self.producers(port);
                 let help = match fitting.as_slice() {
                     [] => format!("no pass of this graph makes a {}", port.resource.name),
@@ -499,6 +625,7 @@ impl<W: World> Wiring<'_, W> {
             if std::mem::replace(&mut seen[current], true) {
                 continue;
             }
+            open.extend(self.meant.iter().filter(|(reader, _)| *reader == current).map(|(_, producer)| *producer));
             let wired = &self.passes[current];
             for (port, sources) in wired.kind.info().inputs.iter().zip(&wired.sources) {
                 if !port.history {
@@ -520,6 +647,8 @@ impl<W: World> Wiring<'_, W> {
         match (port.arity, candidates.len()) {
             (Arity::List, _) | (_, 1) => self.passes[index].sources[port_index] = candidates,
             (Arity::Optional, 0) => {}
+            // It may be what an unknown pass would have made.
+            (Arity::One, 0) if !self.names.unknown.is_empty() => {}
             (Arity::One, 0) => {
                 let kinds: Vec<_> =
                     self.registry.infos().filter(|info| info.outputs.iter().any(|output| output.resource == port.resource)).collect();

@@ -2,7 +2,8 @@ use super::LoadArguments;
 use crate::failure::Failure;
 use lobelia::{
     Session,
-    graph::{GraphFile, PlanOptions, Problems},
+    frame::SceneWorld,
+    graph::{GraphFile, PlanOptions, Wired},
 };
 use std::{io::Write, path::PathBuf};
 
@@ -29,17 +30,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     let mut failed: Option<Failure> = None;
     for path in &arguments.graphs {
-        let checked = GraphFile::load(path).and_then(|graph| {
-            let names: Vec<String> = graph.variant_names().map(str::to_owned).collect();
-            for variants in std::iter::once(Vec::new()).chain(names.iter().map(|name| vec![name.clone()])) {
-                let planned = graph.wire(&registry, &variants, &[]).and_then(|wired| match &traits {
-                    Some(traits) => wired.plan(traits, &PlanOptions::new([960, 540])).map(|_| ()),
-                    None => Ok(()),
-                });
-                planned.map_err(|problems| in_variant(problems, variants.first()))?;
-            }
-            Ok(names.len())
-        });
+        let mut plan = |wired: &Wired<SceneWorld>| match &traits {
+            Some(traits) => wired.plan(traits, &PlanOptions::new([960, 540])).map(|_| ()),
+            None => Ok(()),
+        };
+        let checked = GraphFile::load(path).and_then(|graph| graph.check(&registry, &mut plan));
         match checked {
             Ok(variants) => writeln!(out, "{}: good ({variants} variants)", path.display())?,
             Err(problems) => {
@@ -51,14 +46,4 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
     }
     failed.map_or(Ok(()), Err)
-}
-
-/// The place of a problem may be in a pass that is good without the variant, so the variant is named.
-fn in_variant(mut problems: Problems, variant: Option<&String>) -> Problems {
-    if let Some(variant) = variant {
-        for problem in &mut problems.problems {
-            problem.message = format!("variant `{variant}`: {}", problem.message);
-        }
-    }
-    problems
 }
