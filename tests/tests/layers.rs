@@ -239,7 +239,10 @@ fn what_cannot_be_saved_is_refused_before_anything_is_rendered() {
     let place = Place::new();
     let before = place.files();
     for (arguments, says) in [
-        ("--save gbuffer.nromal=n.exr", "`gbuffer.nromal`: a G-buffer has no layer `nromal` (did you mean `normal`?); its layers are normal,"),
+        (
+            "--save gbuffer.nromal=n.exr",
+            "`gbuffer.nromal`: a G-buffer has no layer `nromal` (did you mean `normal`?); its layers are normal,",
+        ),
         ("--save gbuffer.albedo_of=n.exr", "position"),
         ("--save gbuffer.depth=d.png", "d.png: this cannot be written in that format; name the file with .exr, .npz"),
         ("--save sum.normal=n.exr", "there is no `sum.normal`"),
