@@ -340,3 +340,13 @@ fn impossible_camera_keys_are_refused_by_place() {
     );
     refused(&with("origin: (4, 1, 0)", "origin: (inf, 1, 0)"), 7, 14, "key 2: origin is [inf, 1, 0], but must be finite");
 }
+
+#[test]
+fn the_example_of_the_documentation_is_a_scene() {
+    let page = include_str!("../../../../docs/scenes.md");
+    let example = page.split("```ron\n").nth(1).unwrap().split("```").next().unwrap();
+    let scene = load(example).unwrap();
+    assert_eq!(scene.camera(None).unwrap().name, "walk");
+    assert!(["key", "bulb", "sun"].iter().all(|name| scene.lights.iter().any(|light| light.name == *name)));
+    assert_eq!(scene.traits().animation_seconds, 2.0);
+}
