@@ -7,7 +7,7 @@
 //! | `base_color` | R G B | linear, in [0, 1] | 0 |
 //! | `roughness` | V | perceptual roughness, in [0, 1]; 1 where no material of the scene has a specular lobe | 0 |
 //! | `metallic` | V | in [0, 1] | 0 |
-//! | `specular` | V | scale of the specular lobe, in [0, 1] (not F0; 1 is a dielectric's 0.04) | 0 |
+//! | `specular` | V | scale of the specular lobe, in [0, 1]; not F0, which is not a layer | 0 |
 //! | `emissive` | R G B | radiance that the surface emits towards the camera, W/(sr m^2) | 0 |
 //! | `depth` | Z | distance along the view axis, metres: a plane that faces the camera has one depth | [`NO_DEPTH`] |
 //! | `position` | X Y Z | world space, metres | 0 |
@@ -196,12 +196,17 @@ impl DecodedGBuffer {
         let missing = || SessionError::Argument(format!("`{port}` is no G-buffer that can be decoded"));
         let depth: Vec<f32> = words(&parts, "depth").ok_or_else(missing)?.into_iter().map(f32::from_bits).collect();
         let core = words(&parts, "core").ok_or_else(missing)?.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect();
+        // Two words a texel where dielectrics have reflectances of their own; the first is the same.
+        let specular = words(&parts, "specular").map(|words| {
+            let stride = (words.len() / depth.len().max(1)).max(1);
+            words.into_iter().step_by(stride).collect()
+        });
         let view = *rendering.view().ok_or_else(missing)?;
         Ok(Self {
             extent: rendering.plan().extent,
             depth,
             core,
-            specular: words(&parts, "specular"),
+            specular,
             geometric_normal: words(&parts, "geometric_normal"),
             emissive: words(&parts, "emissive"),
             view,
