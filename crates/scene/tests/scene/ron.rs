@@ -289,6 +289,7 @@ fn a_byte_order_mark_moves_no_position_and_rounding_is_clamped() {
     assert_eq!(scene.lights[0].kind, LightKind::Spot { inner: 0.0, outer: std::f32::consts::FRAC_PI_2 });
     assert_eq!(scene.lights[1].kind, LightKind::Spot { inner: 0.4, outer: 0.4 });
     assert!(scene.warnings.iter().filter(|warning| warning.contains("clamped")).count() == 2, "{:?}", scene.warnings);
+}
 
 const WALK: &str = r#"(
     gltf: "builtin:cornell-glossy",
