@@ -5,6 +5,8 @@ pub mod check;
 pub mod compare;
 mod compare_report;
 pub mod explain;
+pub mod layer_files;
+pub mod numbered;
 pub mod passes;
 pub mod reference;
 pub mod render;
@@ -95,7 +97,9 @@ pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
 pub fn parse_save(text: &str) -> Result<(String, PathBuf), String> {
     match text.split_once('=') {
         Some((port, file)) if !port.is_empty() && !file.is_empty() => Ok((port.to_owned(), Path::new(file).to_owned())),
-        _ => Err(format!("`{text}` is not of the form PASS.PORT=FILE, such as indirect.radiance=indirect.exr")),
+        _ => {
+            Err(format!("`{text}` is not of the form PASS.PORT=FILE, such as indirect.radiance=indirect.exr or gbuffer.normal=normal.exr"))
+        }
     }
 }
 

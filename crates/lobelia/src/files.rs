@@ -84,6 +84,16 @@ pub fn write_radiance_npz(path: &Path, picture: &Image) -> Result<(), Failure> {
     })
 }
 
+/// Writes a layer as a NumPy array of height, width and, where there is more than one, channels.
+pub fn write_layer_npz(path: &Path, name: &str, layer: &lobelia::layers::LayerImage) -> Result<(), Failure> {
+    let mut dimensions = vec![u64::from(layer.extent[1]), u64::from(layer.extent[0])];
+    dimensions.extend((layer.values.len() > 1).then_some(layer.values.len() as u64));
+    atomically(path, |file| {
+        let mut archive = npyz::npz::NpzWriter::new(std::io::BufWriter::new(file));
+        append(&mut archive, name, &dimensions, layer.interleaved()).map_err(|error| error.to_string())
+    })
+}
+
 type Archive<'a> = npyz::npz::NpzWriter<std::io::BufWriter<&'a mut std::fs::File>>;
 
 fn write_array(archive: &mut Archive<'_>, part: &Part, data: &PartData) -> std::io::Result<()> {

@@ -39,6 +39,7 @@ pub use lobelia_vsl as vsl;
 pub mod comparison;
 pub mod explain;
 pub mod exposure;
+pub mod layers;
 pub mod light;
 mod session;
 pub mod sweep;

@@ -28,6 +28,9 @@ pub enum SessionError {
     /// An argument.
     #[error("{0}")]
     Argument(String),
+    /// A file that could not be written.
+    #[error("{0}")]
+    Write(String),
 }
 
 impl SessionError {
@@ -306,6 +309,26 @@ impl Rendering<'_> {
         self.session.device.pre_exposure()
     }
 
+    /// The scene at the moment of the last frame.
+    pub fn scene(&self) -> &Scene {
+        &self.session.scene
+    }
+
+    /// The camera of the last frame.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// What is rendered.
+    pub fn shot(&self) -> &Shot {
+        &self.shot
+    }
+
+    /// The view of the last sample; none before the first.
+    pub fn view(&self) -> Option<&ViewUniform> {
+        self.view.as_ref()
+    }
+
     /// `pass.port` of the radiance that the graph ends in, or that its display image shows; `None` where it ends in something else.
     pub fn linear_output(&self) -> Option<String> {
         self.linear.clone()
@@ -319,7 +342,7 @@ impl Rendering<'_> {
     /// Runs all frames and samples; `step` hears how far it is and stops it by returning `false`.
     pub fn run(&mut self, step: &mut dyn FnMut(&Step) -> bool) -> Result<Picture, SessionError> {
         self.run_frames(step, &mut |_| Ok(()))?;
-        self.picture()
+        self.picture(false)
     }
 
     /// As [`Rendering::run`]; `seen` is called after every frame, while what it made can be read.
@@ -330,14 +353,31 @@ impl Rendering<'_> {
     ) -> Result<(), SessionError> {
         self.runner.reset_history();
         for frame in 0..self.shot.frames {
-            self.advance(frame);
-            self.sums = self.radiances().into_iter().map(|name| Sum { name, total: Vec::new(), groups: Vec::new() }).collect();
-            for sample in 0..self.shot.samples {
-                self.sample(frame, sample, step)?;
-            }
+            self.frame(frame, step)?;
             seen(self)?;
         }
         Ok(())
+    }
+
+    /// As [`Rendering::run`], with a picture of every frame: `each` gets it while everything else that the frame made can be read.
+    pub fn run_each<E: From<SessionError>>(
+        &mut self,
+        step: &mut dyn FnMut(&Step) -> bool,
+        each: &mut dyn FnMut(&Self, u32, Picture) -> Result<(), E>,
+    ) -> Result<(), E> {
+        self.runner.reset_history();
+        for frame in 0..self.shot.frames {
+            self.frame(frame, step)?;
+            let picture = self.picture(frame + 1 < self.shot.frames)?;
+            each(self, frame, picture)?;
+        }
+        Ok(())
+    }
+
+    fn frame(&mut self, frame: u32, step: &mut dyn FnMut(&Step) -> bool) -> Result<(), SessionError> {
+        self.advance(frame);
+        self.sums = self.radiances().into_iter().map(|name| Sum { name, total: Vec::new(), groups: Vec::new() }).collect();
+        (0..self.shot.samples).try_for_each(|sample| self.sample(frame, sample, step))
     }
 
     /// Moves an animated scene on.
@@ -439,7 +479,8 @@ impl Rendering<'_> {
         self.shot.seed = seed;
     }
 
-    fn picture(&mut self) -> Result<Picture, SessionError> {
+    /// The picture of the frame that was run. Where more frames follow, they find the radiance as the last sample left it.
+    fn picture(&mut self, more_follow: bool) -> Result<Picture, SessionError> {
         // An output that is neither radiance nor a display image has no picture; `--save` writes it.
         let Some(linear) = self.linear.clone() else {
             return Ok(Picture { extent: self.shot.extent, pixels: Vec::new(), display: None });
@@ -449,8 +490,13 @@ impl Rendering<'_> {
         if self.shown.is_some() {
             if self.shot.samples > 1 {
                 // The display image shows the average: the averaged radiance is put back and only its last pass runs again.
+                let last = if more_follow { Some(self.runner.read_image(&self.session.gpu, &linear)?.to_f32_rgba()) } else { None };
                 self.runner.write_image(&self.session.gpu, &linear, &image.pixels)?;
                 self.runner.rerun_maker(&self.session.gpu, &self.session.device, &self.output, self.shot.seed)?;
+                if let Some(last) = last {
+                    let last: Vec<[f32; 3]> = last.into_iter().map(|[r, g, b, _]| [r, g, b]).collect();
+                    self.runner.write_image(&self.session.gpu, &linear, &last)?;
+                }
             }
             display = Some(self.runner.read_image(&self.session.gpu, &self.output)?.bytes);
         }

@@ -14,6 +14,7 @@ pub mod linearly_transformed_cosine;
 pub mod lobe_similarity;
 pub mod microfacet_lobe;
 pub mod octahedral;
+pub mod packing;
 pub mod quadrature;
 pub mod sampling;
 pub mod sg;

@@ -24,6 +24,9 @@
 //!         "key": [(seconds: 0, position: (0, 2, 0), direction: (0, -1, 0)), (seconds: 2, position: (1, 2, 0), direction: (1, -1, 0))],
 //!         "bulb": [(seconds: 0.5, position: (1, 1, 1)), (seconds: 1, position: (1, 1, 2))],
 //!     },
+//!     camera_motion: {                             // key frames of any camera of the scene; origin and target go straight from key to key
+//!         "close": [(seconds: 0, origin: (0, 1, 3), target: (0, 1, 0)), (seconds: 2, origin: (1, 1, 3), target: (0, 1, 0))],
+//!     },
 //!     materials: {                                 // in this order; "*" is every surface that is not an area light's
 //!         "*": (specular: 0.0),
 //!         "Gold": (roughness: 0.2, base_color: (1, 0.8, 0.3), metallic: 1, emissive: (0, 0, 0), normal_map: false),
@@ -113,6 +116,7 @@ pub struct Scene {
     nodes: NodeTree,
     poses: pose::Poses,
     motions: Vec<motion::LightMotion>,
+    camera_motions: Vec<motion::CameraMotion>,
     version: u64,
 }
 
@@ -194,8 +198,9 @@ impl Scene {
         let cameras = self.cameras.iter().map(|camera| ("camera", &camera.name, camera.position));
         let ways = self.motions.iter().flat_map(|motion| motion.keys.iter().map(|key| ("light", &motion.light, key.position)));
         let ways = ways.filter_map(|(kind, name, position)| Some((kind, name, position?)));
+        let views = self.camera_motions.iter().flat_map(|motion| motion.keys.iter().map(|key| ("camera", &motion.camera, key.origin)));
         let origin = self.origin();
-        for (kind, name, position) in lights.chain(cameras).chain(ways) {
+        for (kind, name, position) in lights.chain(cameras).chain(ways).chain(views) {
             if !position.is_finite() || (position - origin).abs().max_element() > MAX_REACH {
                 let what =
                     format!("{kind} `{name}` is at {position}; it must be within {MAX_REACH:e} m of the scene, which is at {origin}");
@@ -216,7 +221,21 @@ impl Scene {
             moved |= self.pose().0;
         }
         moved |= self.move_lights(seconds);
+        moved |= self.move_cameras(seconds);
         self.version += u64::from(moved);
+    }
+
+    /// Puts cameras where their key frames say; whether anything moved.
+    fn move_cameras(&mut self, seconds: f32) -> bool {
+        let mut moved = false;
+        for motion in &self.camera_motions {
+            for camera in self.cameras.iter_mut().filter(|camera| camera.name == motion.camera) {
+                let before = (camera.position, camera.forward, camera.up);
+                motion.place(camera, seconds);
+                moved |= before != (camera.position, camera.forward, camera.up);
+            }
+        }
+        moved
     }
 
     /// Puts lights where their key frames say; whether anything moved.
@@ -395,10 +414,11 @@ impl Scene {
     }
 
     pub(crate) fn animation_seconds(&self) -> f32 {
-        self.motions.iter().map(motion::LightMotion::end).fold(self.nodes.animation_seconds(), f32::max)
+        let ends = self.motions.iter().map(motion::LightMotion::end).chain(self.camera_motions.iter().map(motion::CameraMotion::end));
+        ends.fold(self.nodes.animation_seconds(), f32::max)
     }
 
     pub(crate) fn is_animated(&self) -> bool {
-        self.nodes.is_animated() || !self.motions.is_empty()
+        self.nodes.is_animated() || !self.motions.is_empty() || !self.camera_motions.is_empty()
     }
 }

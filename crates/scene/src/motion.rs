@@ -1,5 +1,6 @@
-//! Lights that a RON scene moves along key frames.
+//! Lights and cameras that a RON scene moves along key frames.
 
+use crate::Camera;
 use glam::{DQuat, DVec3};
 
 /// Where a light is at a moment.
@@ -29,16 +30,60 @@ impl LightMotion {
     /// Position and direction, those that the keys give: on straight lines and great circles between keys at an even speed, and standing still before the
     /// first and after the last.
     pub fn at(&self, seconds: f32) -> (Option<DVec3>, Option<DVec3>) {
-        let next = self.keys.partition_point(|key| key.seconds <= seconds).min(self.keys.len() - 1);
-        let (from, to) = (&self.keys[next.saturating_sub(1)], &self.keys[next]);
-        let length = f64::from(to.seconds) - f64::from(from.seconds);
-        let t = if length > 0.0 { ((f64::from(seconds) - f64::from(from.seconds)) / length).clamp(0.0, 1.0) } else { 0.0 };
+        let (from, to, t) = between(&self.keys, |key| key.seconds, seconds);
         let position = from.position.zip(to.position).map(|(from, to)| from.lerp(to, t));
         let direction = from.direction.zip(to.direction).map(|(from, to)| {
             let turn = DQuat::IDENTITY.slerp(DQuat::from_rotation_arc(from, to), t);
             (turn * from).normalize_or(from)
         });
         (position, direction)
+    }
+}
+
+/// The keys, at least one, before and after a moment, and how far it is from one to the other, in [0, 1].
+fn between<K>(keys: &[K], seconds_of: impl Fn(&K) -> f32, seconds: f32) -> (&K, &K, f64) {
+    let next = keys.partition_point(|key| seconds_of(key) <= seconds).min(keys.len() - 1);
+    let (from, to) = (&keys[next.saturating_sub(1)], &keys[next]);
+    let (start, end) = (f64::from(seconds_of(from)), f64::from(seconds_of(to)));
+    let t = if end > start { ((f64::from(seconds) - start) / (end - start)).clamp(0.0, 1.0) } else { 0.0 };
+    (from, to, t)
+}
+
+/// Where a camera is at a moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct CameraKey {
+    pub seconds: f32,
+    /// World space, metres.
+    pub origin: DVec3,
+    /// World space, metres.
+    pub target: DVec3,
+}
+
+/// The way of one camera.
+#[derive(Clone, Debug)]
+pub(crate) struct CameraMotion {
+    /// Name of the camera.
+    pub camera: String,
+    /// Upwards in the picture, not along the view at any moment.
+    pub up: DVec3,
+    /// At least one; seconds rise.
+    pub keys: Vec<CameraKey>,
+}
+
+impl CameraMotion {
+    pub fn end(&self) -> f32 {
+        self.keys.last().map_or(0.0, |key| key.seconds)
+    }
+
+    /// Puts a camera where it is at a moment: origin and target go straight from key to key at an even speed, and stand still before the first and
+    /// after the last.
+    pub fn place(&self, camera: &mut Camera, seconds: f32) {
+        let (from, to, t) = between(&self.keys, |key| key.seconds, seconds);
+        let (origin, target) = (from.origin.lerp(to.origin, t), from.target.lerp(to.target, t));
+        if let Some(placed) = Camera::look_at("", origin, target, self.up, camera.yfov, camera.near) {
+            let Camera { position, forward, up, right, .. } = placed;
+            (camera.position, camera.forward, camera.up, camera.right) = (position, forward, up, right);
+        }
     }
 }
 

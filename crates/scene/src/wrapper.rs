@@ -1,5 +1,6 @@
 //! RON scenes: a glTF file (or a built-in scene) with camera, lights, environment and materials added or overridden.
 
+mod camera_motion;
 mod motion;
 mod position;
 
@@ -58,6 +59,8 @@ struct Written {
     keep_lights: bool,
     #[serde(default)]
     light_motion: Ordered<Vec<motion::WrittenKey>>,
+    #[serde(default)]
+    camera_motion: Ordered<Vec<camera_motion::WrittenCameraKey>>,
     #[serde(default)]
     materials: Ordered<WrittenMaterial>,
 }
@@ -218,6 +221,11 @@ pub(crate) fn parse(text: &str, shown: &str, folder: &Path, load: &LoadOptions) 
     add_cameras(&file, &mut scene, &written.cameras)?;
     add_lights(&file, &mut scene, &written.lights)?;
     motion::add(&file, &mut scene, &written.light_motion)?;
+    let up_of = |name: &str| {
+        let camera = written.cameras.0.iter().find(|(known, _)| known == name);
+        camera.map_or(DVec3::Y, |(_, camera)| DVec3::from(camera.up).normalize_or(DVec3::Y))
+    };
+    camera_motion::add(&file, &mut scene, &written.camera_motion, up_of)?;
     change_materials(&file, &mut scene, &written.materials)?;
     Ok(scene)
 }

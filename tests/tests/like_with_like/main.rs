@@ -322,7 +322,7 @@ fn a_pass_that_does_not_state_its_light_is_named() {
     assert_eq!(truth_paths(None, std::slice::from_ref(&known)), LightPaths::Only(LightTransport::of(LightClass::Punctual, [1])));
     assert_eq!(truth_paths(None, &[known.clone(), own.clone()]), LightPaths::Full { depth: 2 });
     let asked = Some(LightPaths::Direct);
-    assert_eq!(truth_paths(asked, &[own.clone()]), LightPaths::Direct);
+    assert_eq!(truth_paths(asked, std::slice::from_ref(&own)), LightPaths::Direct);
     let techniques = [("known", &known), ("own", &own)];
     let mut mean = |light: &LightTransport| Ok::<_, std::convert::Infallible>(if light.has(LightClass::Emissive, 1) { 1.0 } else { 4.0 });
     let light = compare(Some(&LightPaths::Full { depth: 2 }), &techniques, &traits, &mut mean).unwrap();

@@ -1,4 +1,4 @@
-use super::{GraphArguments, SceneArguments, parse_save, parse_size};
+use super::{GraphArguments, SceneArguments, layer_files, numbered, parse_save, parse_size, sequence::parse_fps};
 use crate::{
     failure::Failure,
     files::{self, Kind},
@@ -11,6 +11,7 @@ use lobelia::{
     explain::mebibytes,
     frame::{DisplayImage, Radiance, SceneWorld},
     graph::{FrameReport, Plan, Resource, RunOptions, Timing},
+    layers::{LayerSet, Target},
     measure::timing::Summary,
 };
 use std::{
@@ -26,14 +27,17 @@ Examples:
   lobelia render graphs/indirect.ron --scene room.glb --camera sofa --size 1280x720 --samples 16 -o out.exr
   lobelia render graphs/indirect.ron --variant no-visibility --set lights.count=4096 --save indirect.radiance=indirect.exr -o out.png
   lobelia render graphs/direct.ron --scene box.glb --frames 50 --profile trace.json -o out.png
+  lobelia render graphs/direct.ron --scene walk.glb --frames 48 --fps 24 -o 'frame.####.png'
+  lobelia render graphs/indirect.ron --aovs all.exr --save gbuffer.normal=normal.exr -o out.png
   lobelia render graphs/progressive.ron --scene builtin:cornell-glossy --frames 256 --progressive -o out.png")]
 pub struct Arguments {
     #[command(flatten)]
-    graph: GraphArguments,
+    pub graph: GraphArguments,
     #[command(flatten)]
-    scene: SceneArguments,
-    /// Picture to write: .png (the graph's output as it is displayed) or .exr (linear RGB before tone mapping).
-    #[arg(short, long, value_name = "FILE", required_unless_present = "saves")]
+    pub scene: SceneArguments,
+    /// Picture to write: .png (the graph's output as it is displayed) or .exr (linear RGB before tone mapping). With #### or %04d in the name, every frame
+    /// is written, numbered from 0.
+    #[arg(short, long, value_name = "FILE", required_unless_present_any = ["saves", "aovs"])]
     output: Option<PathBuf>,
     /// Size of the picture in pixels, each side at most 8192.
     #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "960x540")]
@@ -43,20 +47,29 @@ pub struct Arguments {
     camera: Option<String>,
     /// Average this many sub-pixel-jittered frames in linear radiance.
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    samples: u32,
-    /// Run this many frames and write the last; animated scenes move on by 1/24 s each.
+    pub samples: u32,
+    /// Run this many frames; animated scenes move on from one to the next. The last is written, and every one to names with #### or %04d.
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     frames: u32,
+    /// Frames per second of an animated scene; 24 if it is not given.
+    #[arg(long, value_name = "F", value_parser = parse_fps)]
+    fps: Option<f32>,
     /// Let frames be samples of one picture: each has random numbers and sub-pixel offsets of its own, and animations stand still. For graphs with a
     /// `progressive` pass, which shows the mean of all frames.
     #[arg(long)]
     progressive: bool,
     /// Seed of everything random; equal seeds give equal pictures.
     #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
-    seed: u32,
-    /// Write any resource of the graph: .exr (radiance), .png (display image or radiance), .npz (anything). Radiances are averaged over the samples; everything else is that of the last frame.
+    pub seed: u32,
+    /// Write any resource of the graph: .exr (radiance), .png (display image or radiance), .npz (anything), or a decoded layer of a G-buffer
+    /// (gbuffer.normal, geometric_normal, base_color, roughness, metallic, specular, emissive, depth, position) as .exr, .npz or, where it makes sense, .png.
+    /// Radiances are averaged over the samples; everything else, layers included, is that of the last sample.
     #[arg(long = "save", value_name = "PASS.PORT=FILE", value_parser = parse_save)]
     saves: Vec<(String, PathBuf)>,
+    /// Write one EXR file of many layers: the picture, each radiance that it sums (direct.R, ...), and all layers of the G-buffer (normal.X, depth.Z, ...),
+    /// with graph, scene, camera and more in its header. The picture and its terms are averaged over the samples; the rest is of the last sample.
+    #[arg(long, value_name = "FILE.exr")]
+    aovs: Option<PathBuf>,
     /// Write a trace of CPU and device work that Perfetto and chrome://tracing open.
     #[arg(long, value_name = "FILE")]
     profile: Option<PathBuf>,
@@ -75,7 +88,7 @@ pub struct Arguments {
     check: bool,
     /// Print nothing but errors.
     #[arg(short, long)]
-    quiet: bool,
+    pub quiet: bool,
     /// Print what was done as JSON.
     #[arg(long)]
     json: bool,
@@ -97,14 +110,20 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         frames: arguments.frames,
         progressive: arguments.progressive,
         seed: arguments.seed,
-        keep: arguments.saves.iter().map(|(port, _)| port.clone()).collect(),
+        frame_seconds: 1.0 / arguments.fps.unwrap_or(24.0),
         specialise: !arguments.no_specialise,
         ..Shot::default()
     };
     // Everything that can be wrong with the input is found before the device is started.
     scene.camera(shot.camera.as_deref()).map_err(lobelia::SessionError::from)?;
-    let plan = wired.plan(&scene.traits(), &shot.plan_options())?;
-    check_kinds(arguments, &plan)?;
+    let traits = scene.traits();
+    let targets = arguments.saves.iter().map(|(port, _)| Target::resolve(&wired, &traits, &shot.plan_options(), port));
+    let targets = targets.collect::<Result<Vec<_>, _>>()?;
+    shot.keep = targets.iter().map(|target| target.port.clone()).collect();
+    let plan = wired.plan(&traits, &shot.plan_options())?;
+    check_kinds(arguments, &targets, &plan)?;
+    let set = if arguments.aovs.is_some() { Some(layer_files::set(arguments, &plan)?) } else { None };
+    shot.keep.extend(set.iter().flat_map(LayerSet::keep));
     warn_uncast(arguments, &plan, &scene.traits());
     if !arguments.quiet {
         for warning in plan.warnings() {
@@ -125,18 +144,24 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut session = Session::with(gpu, scene, arguments.scene.time)?;
     let mut rendering = session.start(&wired, &shot)?;
     let bar = progress_bar(arguments, &shot);
-    let picture = rendering.run(&mut |step| show_step(&bar, &shot, step))?;
+    let mut step = |step: &Step| show_step(&bar, &shot, step);
+    let results = Results { arguments, targets: &targets, set: set.as_ref() };
+    let picture = if results.numbered() {
+        let mut last = None;
+        rendering.run_each::<Failure>(&mut step, &mut |rendering, frame, picture| {
+            results.write(rendering, frame, &picture)?;
+            last = Some(picture);
+            Ok(())
+        })?;
+        last.ok_or_else(|| Failure::Run("there is no frame".into()))?
+    } else {
+        let picture = rendering.run(&mut step)?;
+        results.write(&rendering, shot.frames - 1, &picture)?;
+        picture
+    };
     bar.finish_and_clear();
-
-    if let Some(path) = &arguments.output {
-        match (files::kind_of(path, &[Kind::Png, Kind::Exr])?, &picture.display) {
-            (Kind::Exr, _) => files::write_exr(path, &picture.image())?,
-            (_, Some(rgba)) => files::write_png(path, picture.extent, rgba)?,
-            (_, None) => files::write_linear_png(path, &picture.image())?,
-        }
-    }
-    for (port, path) in &arguments.saves {
-        save(&rendering, port, path)?;
+    if shot.samples > 1 && !arguments.quiet && (set.is_some() || targets.iter().any(|target| target.layer.is_some())) {
+        eprintln!("note: radiance is the mean of {} samples; layers of the G-buffer are of the last sample", shot.samples);
     }
     hint_at_exposure(arguments, rendering.plan(), &picture);
     if let Some(path) = &arguments.profile {
@@ -144,6 +169,58 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     warn_saturated(arguments, &rendering);
     report(arguments, &rendering, timing)
+}
+
+/// What is to be written.
+struct Results<'a> {
+    arguments: &'a Arguments,
+    /// Of the saves, in order.
+    targets: &'a [Target],
+    set: Option<&'a LayerSet>,
+}
+
+impl Results<'_> {
+    /// Whether a file is written for every frame.
+    fn numbered(&self) -> bool {
+        !self.arguments.progressive && self.arguments.goals().any(|path| matches!(numbered::Numbered::of(path), Ok(Some(_))))
+    }
+
+    /// Writes what belongs to a frame.
+    fn write(&self, rendering: &Rendering<'_>, frame: u32, picture: &lobelia::Picture) -> Result<(), Failure> {
+        let arguments = self.arguments;
+        let file = |path: &Path| arguments.file_of(path, frame);
+        if let Some(path) = arguments.output.as_deref().and_then(file) {
+            match (files::kind_of(&path, &[Kind::Png, Kind::Exr])?, &picture.display) {
+                (Kind::Exr, _) => files::write_exr(&path, &picture.image())?,
+                (_, Some(rgba)) => files::write_png(&path, picture.extent, rgba)?,
+                (_, None) => files::write_linear_png(&path, &picture.image())?,
+            }
+        }
+        for (target, (_, path)) in self.targets.iter().zip(&arguments.saves) {
+            match (file(path), target.layer) {
+                (Some(path), Some(layer)) => layer_files::write(arguments, rendering, (&target.port, layer), frame, &path)?,
+                (Some(path), None) => save(rendering, &target.port, &path)?,
+                (None, _) => {}
+            }
+        }
+        if let (Some(path), Some(set)) = (arguments.aovs.as_deref().and_then(file), self.set) {
+            layer_files::write_all(arguments, rendering, set, frame, &path)?;
+        }
+        Ok(())
+    }
+}
+
+impl Arguments {
+    /// Files that are made of frames.
+    fn goals(&self) -> impl Iterator<Item = &PathBuf> {
+        self.output.iter().chain(self.saves.iter().map(|(_, path)| path)).chain(&self.aovs)
+    }
+
+    /// The file that a frame is written to, if it is. Samples of one picture have no numbers.
+    fn file_of(&self, path: &Path, frame: u32) -> Option<PathBuf> {
+        let last = frame + 1 == self.frames;
+        if self.progressive { last.then(|| path.to_owned()) } else { numbered::file_of(path, frame, last) }
+    }
 }
 
 /// Half floats at 65504 in any frame: resource, values in the frame with the most, and the radiance that this stands for.
@@ -175,12 +252,21 @@ fn check_goals(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.output {
         files::kind_of(path, &[Kind::Png, Kind::Exr])?;
     }
-    let saves = arguments.saves.iter().map(|(_, path)| path);
-    let mut goals = std::collections::BTreeSet::new();
-    for path in arguments.output.iter().chain(saves).chain(&arguments.profile) {
-        files::check_goal(path)?;
-        if !goals.insert(path) {
-            return Err(Failure::Input(format!("{}: two results cannot be written to one file", path.display())));
+    if let Some(path) = &arguments.aovs {
+        files::kind_of(path, &[Kind::Exr])?;
+    }
+    let mut goals: Vec<PathBuf> = Vec::new();
+    for path in arguments.goals() {
+        numbered::Numbered::of(path).map_err(Failure::Input)?;
+        let mut own: Vec<PathBuf> = [0, arguments.frames - 1].into_iter().filter_map(|frame| arguments.file_of(path, frame)).collect();
+        own.dedup();
+        goals.extend(own);
+    }
+    goals.extend(arguments.profile.clone());
+    for (index, file) in goals.iter().enumerate() {
+        files::check_goal(file)?;
+        if goals[..index].contains(file) {
+            return Err(Failure::Input(format!("{}: two results cannot be written to one file", file.display())));
         }
     }
     Ok(())
@@ -198,9 +284,9 @@ fn type_of<'a>(plan: &'a Plan<SceneWorld>, port: &str) -> &'a str {
     plan.find(port).map_or("", |index| plan.resources[index].type_name)
 }
 
-fn check_kinds(arguments: &Arguments, plan: &Plan<SceneWorld>) -> Result<(), Failure> {
-    for (port, path) in &arguments.saves {
-        files::kind_of(path, allowed_kinds(type_of(plan, port)))?;
+fn check_kinds(arguments: &Arguments, targets: &[Target], plan: &Plan<SceneWorld>) -> Result<(), Failure> {
+    for (target, (_, path)) in targets.iter().zip(&arguments.saves) {
+        files::kind_of(path, target.layer.map_or_else(|| allowed_kinds(type_of(plan, &target.port)), layer_files::kinds))?;
     }
     let output = &plan.resources[plan.output];
     if let Some(path) = &arguments.output
@@ -311,13 +397,9 @@ fn report(arguments: &Arguments, rendering: &Rendering<'_>, timing: Timing) -> R
     let rows = rows(rendering);
     let plan = rendering.plan();
     let adapter = rendering.gpu().info().map_or_else(String::new, |info| info.name.clone());
-    let written: Vec<String> = arguments
-        .output
-        .iter()
-        .chain(arguments.saves.iter().map(|(_, path)| path))
-        .chain(&arguments.profile)
-        .map(|path| path.display().to_string())
-        .collect();
+    let frames = |path: &PathBuf| (0..arguments.frames).filter_map(|frame| arguments.file_of(path, frame)).collect::<Vec<_>>();
+    let written = arguments.goals().flat_map(frames).chain(arguments.profile.clone());
+    let written: Vec<String> = written.map(|path| path.display().to_string()).collect();
     let how = match timing {
         Timing::Off => "off",
         Timing::Timestamps => "timestamps",
@@ -375,6 +457,9 @@ fn report(arguments: &Arguments, rendering: &Rendering<'_>, timing: Timing) -> R
         writeln!(out, "left out: {} ({}): {}", dropped.pass, dropped.kind, dropped.reason)?;
     }
     writeln!(out, "device: {adapter}; times: {how}, median of {} frame(s)", rendering.reports().len())?;
-    writeln!(out, "wrote {}", written.join(", "))?;
+    match written.as_slice() {
+        [first, .., last] if written.len() > 8 => writeln!(out, "wrote {} files, {first} to {last}", written.len())?,
+        _ => writeln!(out, "wrote {}", written.join(", "))?,
+    }
     Ok(())
 }

@@ -45,7 +45,8 @@ pub enum FlickerAgainst {
 /// How many times the samples of a technique make its own reference.
 pub const OWN_SAMPLES: u32 = 16;
 
-fn parse_fps(text: &str) -> Result<f32, String> {
+/// Frames per second.
+pub fn parse_fps(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
         Ok(fps) if fps.is_finite() && (1e-3..=1e6).contains(&fps) => Ok(fps),
         _ => Err(format!("`{text}` is no number of frames per second in [0.001, 1000000]")),

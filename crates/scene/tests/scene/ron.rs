@@ -290,3 +290,64 @@ fn a_byte_order_mark_moves_no_position_and_rounding_is_clamped() {
     assert_eq!(scene.lights[1].kind, LightKind::Spot { inner: 0.4, outer: 0.4 });
     assert!(scene.warnings.iter().filter(|warning| warning.contains("clamped")).count() == 2, "{:?}", scene.warnings);
 }
+
+const WALK: &str = r#"(
+    gltf: "builtin:cornell-glossy",
+    cameras: {"walk": (origin: (0, 1, 9), target: (0, 1, 0), yfov: 0.5)},
+    camera_motion: {
+        "walk": [
+            (seconds: 1, origin: (0, 1, 4), target: (0, 1, 0)),
+            (seconds: 3, origin: (4, 1, 0), target: (0, 1, 0)),
+        ],
+    },
+)"#;
+
+#[test]
+fn cameras_move_along_their_keys() {
+    let mut scene = load(WALK).unwrap();
+    let traits = scene.traits();
+    assert!(traits.animated && traits.animation_seconds == 3.0);
+    let mut at = |seconds: f32| {
+        scene.set_time(seconds);
+        (scene.camera(Some("walk")).unwrap(), scene.geometry_version())
+    };
+    // Before the first key it stands there, as it is loaded.
+    let (start, version) = at(0.0);
+    assert_eq!((start.position, start.forward, start.yfov), (DVec3::new(0.0, 1.0, 4.0), DVec3::NEG_Z, 0.5));
+    let (middle, moved) = at(2.0);
+    assert!((middle.position - DVec3::new(2.0, 1.0, 2.0)).length() < 1e-12 && moved == version + 1);
+    assert!((middle.forward - DVec3::new(-1.0, 0.0, -1.0).normalize()).length() < 1e-12);
+    assert!((middle.up - DVec3::Y).length() < 1e-12 && (middle.right - middle.forward.cross(middle.up)).length() < 1e-12);
+    let (end, _) = at(9.0);
+    assert!((end.position - DVec3::new(4.0, 1.0, 0.0)).length() < 1e-12 && (end.forward - DVec3::NEG_X).length() < 1e-12);
+}
+
+#[test]
+fn impossible_camera_keys_are_refused_by_place() {
+    let with = |from: &str, to: &str| {
+        assert!(WALK.contains(from), "{from}");
+        WALK.replace(from, to)
+    };
+    refused(&with("\"walk\": [", "\"wlak\": ["), 5, 9, "no camera is called `wlak`");
+    refused(&with("seconds: 3", "seconds: 1"), 7, 14, "key 2: seconds is 1, but must be more than that of the key before, 1");
+    refused(&with("seconds: 1", "seconds: -1"), 6, 14, "key 1: seconds is -1, but must be finite and not negative");
+    refused(&with("origin: (4, 1, 0), target: (0, 1, 0)", "origin: (0, 9, 0), target: (0, 1, 0)"), 7, 14, "not lie along up");
+    refused(&with("origin: (4, 1, 0)", "origin: (0, 1, 0)"), 7, 14, "key 2: target must differ from origin");
+    refused(
+        &with("origin: (4, 1, 0)", "origin: (0, 1, -4)"),
+        7,
+        14,
+        "key 2: target is such that the view turns straight up, straight down",
+    );
+    refused(&with("origin: (4, 1, 0)", "origin: (inf, 1, 0)"), 7, 14, "key 2: origin is [inf, 1, 0], but must be finite");
+}
+
+#[test]
+fn the_example_of_the_documentation_is_a_scene() {
+    let page = include_str!("../../../../docs/scenes.md");
+    let example = page.split("```ron\n").nth(1).unwrap().split("```").next().unwrap();
+    let scene = load(example).unwrap();
+    assert_eq!(scene.camera(None).unwrap().name, "walk");
+    assert!(["key", "bulb", "sun"].iter().all(|name| scene.lights.iter().any(|light| light.name == *name)));
+    assert_eq!(scene.traits().animation_seconds, 2.0);
+}
