@@ -68,7 +68,7 @@ struct Input { camera: vec4f, forward: vec4f, right: vec4f, up: vec4f, extent: v
 struct Output { position: vec4f, back: vec4f }
 fn evaluate(input: Input) -> Output {
     let none = mat4x4f();
-    let view = View(none, none, input.camera.xyz, input.camera.w, input.forward.xyz, 0u, input.right.xyz, 0u, input.up.xyz, 0u, input.extent, input.jitter);
+    let view = View(none, none, input.camera.xyz, input.camera.w, input.forward.xyz, 0u, input.right.xyz, 0u, input.up.xyz, 1.0, input.extent, input.jitter);
     let position = scene_position(view, input.pixel, input.depth);
     return Output(vec4f(position, 0.0), vec4f(project(view, position), 0.0));
 }";
@@ -117,7 +117,7 @@ fn points_level_with_the_camera_or_behind_it_are_told_by_their_depth() {
 struct Input { position: vec4f }
 struct Output { back: vec4f }
 fn evaluate(input: Input) -> Output {
-    let view = View(mat4x4f(), mat4x4f(), vec3f(0.0), 0.1, vec3f(0.0, 0.0, -1.0), 0u, vec3f(1.0, 0.0, 0.0), 0u, vec3f(0.0, 1.0, 0.0), 0u, vec2f(64.0), vec2f(0.0));
+    let view = View(mat4x4f(), mat4x4f(), vec3f(0.0), 0.1, vec3f(0.0, 0.0, -1.0), 0u, vec3f(1.0, 0.0, 0.0), 0u, vec3f(0.0, 1.0, 0.0), 1.0, vec2f(64.0), vec2f(0.0));
     return Output(vec4f(project(view, input.position.xyz), 0.0));
 }";
     let rows = [[0.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 3.0, 0.0], [0.0, 0.0, -0.05, 0.0], [0.0, 0.0, -0.2, 0.0f32]];
@@ -218,7 +218,7 @@ const SURFACE: &str = "#import lobelia::scene::Material
 struct Input { normal: vec4f, tangent: vec4f, viewer: vec4f, texel: vec4f, scale: f32, front: u32, padding_a: f32, padding_b: f32 }
 struct Output { normal: vec4f, geometric: vec4f, emissive: vec4f }
 fn evaluate(input: Input) -> Output {
-    let material = Material(vec3f(1.0), 0.5, vec3f(3.0), 0.5, 1.0, input.scale, 0.0, 0u);
+    let material = Material(vec3f(1.0), 0.5, vec3f(3.0), 0.5, 1.0, input.scale, 0.0, 0u, vec4f(0.04, 0.04, 0.04, 1.0));
     let texels = MaterialTexels(vec4f(1.0), vec4f(0.0, 1.0, 1.0, 0.0), input.texel, vec4f(1.0));
     let surface = material_surface(material, texels, input.normal.xyz, input.tangent, input.viewer.xyz, input.front != 0u);
     return Output(vec4f(surface.normal, surface.roughness), vec4f(surface.geometric_normal, surface.metallic), vec4f(surface.emissive, surface.specular));

@@ -447,8 +447,8 @@ fn rows() -> Vec<Row> {
         ),
         on_arguments(
             "too many pixels",
-            "explain g.ron --size 8192x8192",
-            &["pass `indirect` (vpl-gather)", "MiB", "render a smaller picture"],
+            "explain g.ron --size 8193x16",
+            &["8193x16", "each side must lie in [1, 8192] pixels"],
         ),
         on_arguments(
             "interleaving that does not match",

@@ -76,7 +76,7 @@ fn what_cannot_be_is_refused() {
     let scene = scene();
     let refusal = |specular: bool, parameters: &str, scene: &Scene| {
         let text = format!(
-            r#"(passes: {{"surfaces": given_gbuffer(specular: {specular}), "rsm": rsm(resolution: 2048), "density": brsm({parameters})}}, output: "density.density")"#
+            r#"(passes: {{"surfaces": given_gbuffer(specular: {specular}), "rsm": rsm(resolution: 1024), "density": brsm({parameters})}}, output: "density.density")"#
         );
         plan(&text, scene, &[]).err().map(|problems| problems.to_string())
     };

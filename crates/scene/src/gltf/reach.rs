@@ -164,6 +164,16 @@ fn node_contents(root: &mut Value, reached: &mut Reached) {
         reached.accessors.extend(index(skin.get("inverseBindMatrices")));
         reached.joints.extend(list(skin, "joints").iter().filter_map(|joint| index(Some(joint))));
     }
+    // A joint is placed by all nodes above it, whether they are drawn or not.
+    let parents: HashMap<usize, usize> = list(root, "nodes")
+        .iter()
+        .enumerate()
+        .flat_map(|(parent, node)| list(node, "children").iter().filter_map(move |child| Some((index(Some(child))?, parent))))
+        .collect();
+    let mut open: Vec<usize> = reached.joints.iter().copied().collect();
+    while let Some(joint) = open.pop() {
+        open.extend(parents.get(&joint).filter(|parent| reached.joints.insert(**parent)));
+    }
     let count = list(root, "nodes").len();
     for (place, node) in list_mut(root, "nodes") {
         if reached.nodes.contains(&place) {
