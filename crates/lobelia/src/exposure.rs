@@ -25,9 +25,9 @@ pub struct Hint {
     pub stops: f64,
 }
 
-/// A hint for a picture whose `display` (sRGB-encoded RGBA, row by row) shows `radiance` at some exposure; `None` where it can be seen, or where nothing in it
-/// is lit, so that no exposure would help.
-pub fn hint(display: &[u8], radiance: &Image) -> Option<Hint> {
+/// A hint for a picture whose `display` (sRGB-encoded RGBA, row by row) shows `radiance` at an exposure, in stops; `None` where it can be seen, or where no other
+/// exposure would help: nothing is lit, or what is lit is well exposed before a black background.
+pub fn hint(display: &[u8], radiance: &Image, exposure: f64) -> Option<Hint> {
     let count = display.len() / 4;
     if count == 0 || count != radiance.pixels.len() {
         return None;
@@ -53,8 +53,9 @@ pub fn hint(display: &[u8], radiance: &Image) -> Option<Hint> {
     if (lit as f64) < (1.0 - MOSTLY) / 2.0 * count as f64 {
         return None;
     }
-    let stops = MIDDLE.log2() - sum / lit as f64;
-    Some(Hint { share, white, stops: (stops * 2.0).round() / 2.0 })
+    let stops = ((MIDDLE.log2() - sum / lit as f64) * 2.0).round() / 2.0;
+    let change = stops - exposure;
+    (if white { change <= -1.0 } else { change >= 1.0 }).then_some(Hint { share, white, stops })
 }
 
 /// A picture of one radiance as a display without a tone curve shows it, for tests of hints.
@@ -78,7 +79,7 @@ mod tests {
     fn what_is_too_bright_or_too_dark_gets_an_exposure_at_which_it_is_seen() {
         for scale in [1e-5, 1e-3, 0.2, 40.0, 1e5] {
             let radiance = ramp(scale);
-            let found = hint(&shown(&radiance, 0.0), &radiance);
+            let found = hint(&shown(&radiance, 0.0), &radiance, 0.0);
             if scale == 0.2 {
                 assert_eq!(found, None);
                 continue;
@@ -87,18 +88,21 @@ mod tests {
             assert_eq!(found.white, scale > 1.0, "{scale}");
             assert!(found.share > 0.9, "{scale}: {found:?}");
             // With the exposure that it names, there is no hint.
-            assert_eq!(hint(&shown(&radiance, found.stops), &radiance), None, "{scale}: {found:?}");
+            assert_eq!(hint(&shown(&radiance, found.stops), &radiance, found.stops), None, "{scale}: {found:?}");
         }
     }
 
     #[test]
     fn darkness_itself_is_no_fault_of_the_exposure() {
         let mut radiance = ramp(0.0);
-        assert_eq!(hint(&shown(&radiance, 0.0), &radiance), None);
+        assert_eq!(hint(&shown(&radiance, 0.0), &radiance, 0.0), None);
         radiance.pixels[3] = [1.0; 3];
-        assert_eq!(hint(&shown(&radiance, 0.0), &radiance), None, "a lamp in the dark");
-        assert_eq!(hint(&[], &Image { width: 0, height: 0, pixels: Vec::new() }), None);
+        assert_eq!(hint(&shown(&radiance, 0.0), &radiance, 0.0), None, "a lamp in the dark");
+        assert_eq!(hint(&[], &Image { width: 0, height: 0, pixels: Vec::new() }, 0.0), None);
+        // Half of the picture is well exposed, before a black background.
+        radiance.pixels[..24].fill([0.2; 3]);
+        assert_eq!(hint(&shown(&radiance, 0.0), &radiance, 0.0), None);
         radiance.pixels.fill([f32::NAN; 3]);
-        assert_eq!(hint(&[255; 64 * 4], &radiance), None);
+        assert_eq!(hint(&[255; 64 * 4], &radiance, 0.0), None);
     }
 }

@@ -316,10 +316,11 @@ fn warn_uncast(arguments: &Arguments, plan: &Plan<SceneWorld>, traits: &lobelia:
 /// A picture that is mostly white or black says nothing; the number that would help is known.
 fn hint_at_exposure(arguments: &Arguments, plan: &Plan<SceneWorld>, picture: &lobelia::Picture) {
     let Some(display) = picture.display.as_ref().filter(|_| !arguments.quiet && arguments.output.is_some()) else { return };
-    let Some(hint) = lobelia::exposure::hint(display, &picture.image()) else { return };
     let pass = &plan.passes[plan.resources[plan.output].maker];
+    let exposure = pass.params_json().get("exposure").and_then(serde_json::Value::as_f64);
+    let Some(hint) = lobelia::exposure::hint(display, &picture.image(), exposure.unwrap_or(0.0)) else { return };
     let colour = if hint.white { "white" } else { "black" };
-    let set = match pass.params_json().get("exposure") {
+    let set = match exposure {
         Some(_) => format!("--set {}.exposure={}", pass.name, hint.stops),
         None => format!("an exposure of {} stops", hint.stops),
     };
