@@ -12,6 +12,8 @@ struct PackageManager {
     /// Arguments that install without asking back; the packages follow.
     install: &'static [&'static str],
     packages: [&'static str; 2],
+    /// What becomes of a package of these that is there in an older version.
+    upgrades: &'static str,
 }
 
 const PACKAGE_MANAGERS: [PackageManager; 3] = [
@@ -20,14 +22,22 @@ const PACKAGE_MANAGERS: [PackageManager; 3] = [
         refresh: Some(&["update"]),
         install: &["install", "-y", "--no-install-recommends"],
         packages: ["mesa-vulkan-drivers", "libvulkan1"],
+        upgrades: "A package of these that is there in an older version is upgraded.",
     },
-    PackageManager { program: "dnf", refresh: None, install: &["install", "-y"], packages: ["mesa-vulkan-drivers", "vulkan-loader"] },
+    PackageManager {
+        program: "dnf",
+        refresh: None,
+        install: &["install", "-y"],
+        packages: ["mesa-vulkan-drivers", "vulkan-loader"],
+        upgrades: "A package of these that is there in an older version may be upgraded.",
+    },
     PackageManager {
         program: "pacman",
         // Fresh lists without a full upgrade would leave an Arch system half upgraded.
         refresh: None,
         install: &["-S", "--needed", "--noconfirm"],
         packages: ["vulkan-swrast", "vulkan-icd-loader"],
+        upgrades: "A package of these that is there in an older version is upgraded.",
     },
 ];
 
@@ -43,7 +53,7 @@ pub fn install(problem: &str, agreed: bool) -> Result<(), String> {
     let commands = commands(manager, prefix);
     let typed: Vec<String> = commands.iter().map(|words| words.join(" ")).collect();
     if !agreed {
-        ask(problem, &typed)?;
+        ask(problem, &typed, manager.upgrades)?;
     }
     for (words, typed) in commands.iter().zip(&typed) {
         println!("Running: {typed}");
@@ -64,12 +74,12 @@ fn commands(manager: &PackageManager, prefix: &[&'static str]) -> Vec<Vec<&'stat
 }
 
 /// Asks on the terminal; anything but a yes is an error that says what to do instead.
-fn ask(problem: &str, commands: &[String]) -> Result<(), String> {
+fn ask(problem: &str, commands: &[String], upgrades: &str) -> Result<(), String> {
     let by_hand = commands.join(" && ");
     if !std::io::stdin().is_terminal() {
-        return Err(format!("{problem}; run again with --yes to install Mesa's software driver, or run: {by_hand}"));
+        return Err(format!("{problem}; run again with --yes to install Mesa's software driver, or run: {by_hand} ({upgrades})"));
     }
-    println!("Lobelia needs one: {problem}.\nMesa's software driver can be installed with:\n  {by_hand}");
+    println!("Lobelia needs one: {problem}.\nMesa's software driver can be installed with:\n  {by_hand}\n{upgrades}");
     print!("Install it now? [y/N] ");
     let mut answer = String::new();
     std::io::stdout().flush().and_then(|()| std::io::stdin().read_line(&mut answer)).map_err(|error| format!("cannot ask: {error}"))?;
@@ -108,6 +118,13 @@ mod tests {
         let apt = "sudo env DEBIAN_FRONTEND=noninteractive apt-get";
         let install = format!("{apt} install -y --no-install-recommends mesa-vulkan-drivers libvulkan1");
         assert_eq!(typed, [format!("{apt} update"), install]);
+    }
+
+    #[test]
+    fn a_prompt_says_what_is_upgraded() {
+        let [apt, dnf, pacman] = &PACKAGE_MANAGERS;
+        assert!(apt.upgrades.ends_with("is upgraded.") && pacman.upgrades.ends_with("is upgraded."));
+        assert!(dnf.upgrades.ends_with("may be upgraded."));
     }
 
     #[test]

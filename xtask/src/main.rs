@@ -81,7 +81,8 @@ enum Chore {
 /// Whether a missing driver may be installed without asking.
 #[derive(Args)]
 struct Consent {
-    /// Install a missing Vulkan driver without asking.
+    /// Install a missing Vulkan driver without asking. Of the packages of loader and driver, apt-get and
+    /// pacman also upgrade those that are there in an older version than their lists have; dnf may.
     #[arg(long, short)]
     yes: bool,
 }
@@ -100,10 +101,17 @@ fn main() -> ExitCode {
     })
 }
 
+/// What rendering is about to do, said before the first step.
+fn plan(picture: Option<&Path>) -> String {
+    let place = picture.map(|picture| format!(", to {}", picture.display())).unwrap_or_default();
+    format!("1. Look for a Vulkan driver.\n2. Build Lobelia: minutes the first time, seconds later.\n3. Render{place}.")
+}
+
 /// Renders the default picture, or what `extra` makes of it, and prints where it is.
 fn render(consent: &Consent, extra: &[OsString]) -> Result<ExitCode, String> {
-    ensure_driver(consent)?;
     let root = workspace_root()?;
+    println!("{}", plan(picture::output(extra).map(|output| root.join(output)).as_deref()));
+    ensure_driver(consent)?;
     let mut command = cargo(&root);
     command.args(["run", "-p", "lobelia-lobelia", "--bin", "lobelia", "--", "render"]);
     command.args(picture::arguments(extra));
@@ -123,6 +131,8 @@ fn test(consent: &Consent) -> Result<ExitCode, String> {
     command.args(["test", "--workspace"]);
     if in_ci() {
         command.env("LOBELIA_REQUIRE_GPU", "1");
+        // Mesa's device-selection layer prints an error where there is no desktop session.
+        command.env("NODEVICE_SELECT", "1");
     }
     run(&mut command).map(exit_code)
 }
@@ -216,4 +226,15 @@ fn exit_code(status: ExitStatus) -> ExitCode {
     let signal = None;
     let code = status.code().or(signal).and_then(|code| u8::try_from(code).ok());
     ExitCode::from(code.unwrap_or(FAILED))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::plan;
+
+    #[test]
+    fn the_plan_says_where_the_picture_will_lie() {
+        assert!(plan(Some("/x/out.png".as_ref())).ends_with("3. Render, to /x/out.png."));
+        assert!(plan(None).ends_with("3. Render."));
+    }
 }

@@ -13,6 +13,7 @@ pub mod render;
 pub mod scene_info;
 pub mod sequence;
 pub mod sweep;
+pub mod variants;
 
 use crate::failure::Failure;
 use clap::Args;

@@ -45,6 +45,7 @@ mod session;
 pub mod sweep;
 pub mod trial;
 pub mod truth;
+pub mod variants;
 
 pub use session::{MAX_SIDE, Picture, Rendering, Session, SessionError, SessionOptions, Shot, Step, frame_time};
 

@@ -22,6 +22,7 @@ Examples:
   lobelia reference --scene builtin:cornell-glossy --paths one-bounce --error 0.02 -o truth.exr
   lobelia explain graphs/indirect.ron --scene builtin:cornell-diffuse
   lobelia passes vpl-gather
+  lobelia variants graphs/indirect.ron
 
 Exit codes: 0 done, 1 the run failed, 2 the input is wrong.")]
 struct Arguments {
@@ -38,6 +39,7 @@ enum Command {
     Reference(commands::reference::Arguments),
     /// List passes, or describe one: ports, parameters, units, ranges, defaults.
     Passes(commands::passes::Arguments),
+    Variants(commands::variants::Arguments),
     /// Show what a scene requires of a graph: order, kept, dropped and why, specialisations, memory.
     Explain(commands::explain::Arguments),
     /// Check graph files, every variant of each. Needs no device.
@@ -64,6 +66,7 @@ fn main() -> ExitCode {
         Command::Sweep(arguments) => commands::sweep::run(&arguments),
         Command::Reference(arguments) => commands::reference::run(&arguments),
         Command::Passes(arguments) => commands::passes::run(&arguments),
+        Command::Variants(arguments) => commands::variants::run(&arguments),
         Command::Explain(arguments) => commands::explain::run(&arguments),
         Command::Check(arguments) => commands::check::run(&arguments),
         Command::SceneInfo(arguments) => commands::scene_info::run(&arguments),
