@@ -445,11 +445,7 @@ fn rows() -> Vec<Row> {
             "render g.ron --scene unlit.gltf --save direct.radiance=a.exr",
             &["does not make `direct.radiance`"],
         ),
-        on_arguments(
-            "too many pixels",
-            "explain g.ron --size 8193x16",
-            &["8193x16", "each side must lie in [1, 8192] pixels"],
-        ),
+        on_arguments("too many pixels", "explain g.ron --size 8193x16", &["8193x16", "each side must lie in [1, 8192] pixels"]),
         on_arguments(
             "interleaving that does not match",
             "explain g.ron --set visibility.interleave=4",
