@@ -265,7 +265,7 @@ fn many_faces_share_layers_and_memory() {
     assert_eq!(planned(10, 1024), (60 << 20, String::new()));
     assert_eq!(planned(42, 128), (252 << 14, String::new()));
     // Four faces a layer: 258 faces in 65 layers.
-    assert_eq!(planned(43, 64), (65 * 4 << 12, String::new()));
+    assert_eq!(planned(43, 64), ((65 * 4) << 12, String::new()));
     for (lights, side) in [(11, 512), (64, 256), (200, 128), (2000, 32)] {
         let (texels, warnings) = planned(lights, 1024);
         assert!(texels <= 25 << 20, "{lights} lights: {texels} texels");
