@@ -207,8 +207,8 @@ fn value(input: Input) -> vec4f { return vec4f(cone_irradiance(input.a.x, input.
             // As for `asg_sg_integral`: what an axis far below the horizon leaves counts against the value along the ASG's axis.
             let [here, along] = [axis, DVec3::Z].map(|axis| asg_sg_integral(light.eta[0], light.eta[1], axis, sharpness));
             let most = expected.value * (along / here.max(1e-300)).min(1e30);
-            // Where that is nothing at all beside it, floats leave a rounding error of a number that nobody sees.
-            let unseen = if here <= 1e-12 * along { 1e-15 } else { 0.0 };
+            // Where nothing is left, in itself or beside it, floats leave a rounding error of a number that nobody sees.
+            let unseen = if expected.value < 1e-30 || here <= 1e-12 * along { 1e-15 } else { 0.0 };
             Expected { bound: expected.bound + 7e-6, scale: expected.scale.max(1e-4 * most).max(unseen), ..expected }
         }),
         of_light!("vsgl_kernel_diffuse_receiver", "input.a.xyz, input.a.w, input.b.xyz, input.b.w, input.c.z", |light| {

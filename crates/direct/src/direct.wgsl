@@ -77,8 +77,6 @@ struct Tap {
     shades: bool,
     // Its surface is the receiver's own.
     own: bool,
-    position: vec3f,
-    normal: vec3f,
 }
 
 fn look(face: RsmFace, texel: vec2u, receiver: Receiver) -> Tap {
@@ -93,20 +91,20 @@ fn look(face: RsmFace, texel: vec2u, receiver: Receiver) -> Tap {
     tap.own = !tap.shades;
 #else
     let texel_uv = (vec2f(texel) + vec2f(0.5)) / f32(face.resolution);
-    tap.position = rsm_ray_origin(face, texel_uv) + rsm_ray(face, texel_uv) * caster;
-    tap.normal = caster_normal(face, texel);
-    let offset = tap.position - receiver.position;
+    let position = rsm_ray_origin(face, texel_uv) + rsm_ray(face, texel_uv) * caster;
+    let normal = caster_normal(face, texel);
+    let offset = position - receiver.position;
     let height = dot(offset, receiver.normal);
     // On a smooth surface a place lies off the plane of another by half their distance times the turn of the normal between them.
-    let turn = tap.normal - receiver.normal;
-    let continuous = dot(tap.normal, receiver.normal) > 0.5;
+    let turn = normal - receiver.normal;
+    let continuous = dot(normal, receiver.normal) > 0.5;
     tap.own = continuous && abs(height) <= receiver.slack + length(offset) * length(turn);
     // Past a convex edge the receiver is met below the other side's plane, but no caster stands behind the receiver's own plane.
     if height <= receiver.rounding {
         return tap;
     }
-    let descent = dot(rsm_ray(face, receiver.uv), tap.normal);
-    let rise = dot(tap.position - rsm_ray_origin(face, receiver.uv), tap.normal);
+    let descent = dot(rsm_ray(face, receiver.uv), normal);
+    let rise = dot(position - rsm_ray_origin(face, receiver.uv), normal);
     // A plane seen edge-on says nothing about its neighbourhood.
     let met = select(caster, clamp(rise / descent, caster - receiver.reach, caster + receiver.reach), abs(descent) > 1e-4);
     tap.shades = met < receiver.distance - select(receiver.rounding, receiver.slack, continuous);
@@ -161,9 +159,7 @@ fn shadow(first: RsmFace, position: vec3f, geometric_normal: vec3f) -> f32 {
     let fraction = corner - vec2f(base);
     var lit = 0.0;
     var own = false;
-    var shaded = 0.0;
-    // The texel that shades most of the filter.
-    var caster: Tap;
+    var shaded = false;
     for (var y = 0; y <= width; y++) {
         let weight_y = select(select(1.0, 1.0 - fraction.y, y == 0), fraction.y, y == width);
         for (var x = 0; x <= width; x++) {
@@ -172,38 +168,25 @@ fn shadow(first: RsmFace, position: vec3f, geometric_normal: vec3f) -> f32 {
             if !tap.shades {
                 lit += weight;
                 own = own || tap.own;
-            } else if weight >= shaded {
-                shaded = weight;
-                caster = tap;
+            } else {
+                shaded = true;
             }
         }
     }
 #ifndef DEPTH_COMPARISON
-    if caster.shades && lit > 0.0 {
-        // Whatever the light passes by, it must end on the receiver's own surface somewhere near: what is seen past the rim of a wall thinner than a texel says
-        // nothing about what is behind the wall.
-        if !own {
-            return 0.0;
-        }
+    if shaded && lit > 0.0 {
         var found = 0;
         for (var y = -1; y <= width + 1; y++) {
-            let weight_y = select(select(1.0, 1.0 - fraction.y, y == 0), fraction.y, y == width);
             for (var x = -1; x <= width + 1; x++) {
-                let weight = weight_y * select(select(1.0, 1.0 - fraction.x, x == 0), fraction.x, x == width);
-                let tap = look(face, texel_at(face, base + vec2i(x, y)), receiver);
-                found += select(0, 1, tap.own);
-                // Where the receiver's surface meets the caster's in a concave edge, what lies in front of the caster is not what lies behind it.
-                let inside = min(x, y) >= 0 && max(x, y) <= width;
-                if inside && tap.own && dot(tap.position - caster.position, caster.normal) > 0.0 {
-                    lit -= weight;
-                }
+                found += select(0, 1, look(face, texel_at(face, base + vec2i(x, y)), receiver).own);
             }
         }
-        // A single texel was seen through a crack that rasterisation leaves where walls abut without sharing corners.
+        // Whatever the light passes by, it must end on the receiver's own surface somewhere near: what is seen past the rim of a wall thinner than a texel says
+        // nothing about what is behind the wall. A single texel was seen through a crack that rasterisation leaves where walls abut without sharing corners.
         if found < 2 {
             return 0.0;
         }
-    } else if !caster.shades && !own {
+    } else if !shaded && !own {
         // In a corner the texels around may all be of what ends there: a look at those around them.
         var shades = false;
         for (var y = -1; y <= width + 1; y++) {
