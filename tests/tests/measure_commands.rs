@@ -295,7 +295,7 @@ fn sweeps_that_cannot_be_run_end_in_words() {
     std::fs::write(place.path("s.ron"), r#"(graph: "absent.ron", scenes: ["builtin:cornell-diffuse"])"#).unwrap();
     for (arguments, code, message) in [
         ("sweep bad.ron --report out", 2, "bad.ron:2:"),
-        ("sweep absent.ron --report out", 1, "absent.ron"),
+        ("sweep absent.ron --report out", 2, "absent.ron"),
         ("sweep s.ron --report out --shard 3/2", 2, "--shard"),
         ("sweep --merge nowhere --report out", 1, "nowhere"),
         ("sweep --report out", 2, "SWEEP.ron"),

@@ -85,7 +85,7 @@ fn light_that_nobody_casts_decides_nothing_unless_it_is_asked_for() {
         let errors = |report: &str| {
             let report = json(&folder.join(report).join("report.json"));
             let variants = report["variants"].as_array().unwrap().clone();
-            [0, 1].map(|index| variants[index]["metrics"]["relative_mse"].as_f64().unwrap())
+            [0, 1].map(|index| variants[index]["metrics"]["relative_mse"]["value"].as_f64().unwrap())
         };
         let (text, _) = good(folder, &format!("{COMPARE} --scene {scene} --report like"));
         let [exact, leaking] = errors("like");
