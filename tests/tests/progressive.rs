@@ -224,8 +224,8 @@ fn a_progressive_rendering_converges() {
     }
     let text = r#"(
         passes: {
-            "gbuffer": gbuffer(), "rsm": rsm(resolution: 128), "density": flux_density(), "lights": vpl_lights(count: 16), "indirect": vpl_gather(),
-            "mean": progressive(from: {"radiance": "indirect.radiance"}),
+            "gbuffer": gbuffer(), "rsm": rsm(resolution: 128), "density": flux_density(), "lights": vpl_lights(count: 16),
+            "indirect": vpl_gather(clamp: 10.0, clamp_unit: metre), "mean": progressive(from: {"radiance": "indirect.radiance"}),
         },
         output: "mean.radiance",
     )"#;
